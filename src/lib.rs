@@ -1,0 +1,2 @@
+//! **linklight**: a Vulkan-native global-illumination renderer.
+pub mod scene;
