@@ -1,11 +1,16 @@
 //! Plain scene data: what a glTF file says, in our own types, and nothing of the GPU.
 //!
 //! [`Scene`] is the file as a person thinks of it (node tree, meshes, materials, lights, cameras, clips). A
-//! [`Pose`] is the scene at one time. [`Geometry`] is the scene flattened for the stages: one vertex per finite
-//! element, triangles with global indices, one [`Part`] per drawn (node, primitive) pair.
+//! [`pose::Pose`] is the scene at one time. [`geometry::Geometry`] is the scene flattened for the stages: one vertex per finite
+//! element, triangles with global indices, one [`geometry::Part`] per drawn (node, primitive) pair.
 //!
 //! Conventions (glTF's own): right-handed, Y up, metres, radians, linear Rec. 709 RGB; punctual intensities are
 //! taken one to one as W/sr (point, spot) and W/m2 (directional).
+
+pub mod adjacency;
+pub mod deform;
+pub mod geometry;
+pub mod pose;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
