@@ -31,43 +31,61 @@ impl WorldVertices {
 
 /// Deforms every vertex of `geometry` by `pose`; both must come from the same scene.
 pub fn world_vertices(geometry: &Geometry, pose: &Pose) -> WorldVertices {
-    let count = geometry.local_positions.len();
+    let count = geometry.vertex_count();
     let mut world = WorldVertices {
-        positions: Vec::with_capacity(count),
-        normals: Vec::with_capacity(count),
-        tangents: Vec::with_capacity(count),
+        positions: Vec::with_capacity(count as usize),
+        normals: Vec::with_capacity(count as usize),
+        tangents: Vec::with_capacity(count as usize),
     };
-    for part in &geometry.parts {
-        for slot in 0..part.vertex_count {
-            let vertex = (part.vertex_offset + slot) as usize;
-            let mut position = geometry.local_positions[vertex];
-            let mut normal = geometry.local_normals[vertex];
-            let mut tangent = geometry.local_tangents[vertex].truncate();
-            for target in 0..part.morph_target_count {
-                let weight = pose.morph_weights[(part.morph_weight_offset + target) as usize];
-                let delta = (part.morph_offset + target * part.vertex_count + slot) as usize;
-                position += weight * geometry.morph_positions[delta];
-                normal += weight * geometry.morph_normals[delta];
-                tangent += weight * geometry.morph_tangents[delta];
-            }
-            let world_from_local = match part.skin_offset {
-                None => pose.world_from_node[part.node as usize],
-                Some(first) => {
-                    let influence = (first + slot) as usize;
-                    let joints = geometry.skin_joints[influence];
-                    blend(&pose.joint_palette, joints, geometry.skin_weights[influence])
-                }
-            };
-            let linear = Mat3::from_mat4(world_from_local);
-            let handedness = geometry.local_tangents[vertex].w;
-            let mirror = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
-            let normal = unit_or(normal_matrix(linear) * normal, geometry.local_normals[vertex]);
-            world.positions.push(world_from_local.transform_point3(position));
-            world.normals.push(normal);
-            world.tangents.push(unit_or(linear * tangent, tangent).extend(handedness * mirror));
+    for vertex in 0..count {
+        let v = vertex as usize;
+        let (mut normal, mut tangent) = (geometry.local_normals[v], geometry.local_tangents[v].truncate());
+        for (weight, delta) in morphs(geometry, pose, vertex) {
+            normal += weight * geometry.morph_normals[delta];
+            tangent += weight * geometry.morph_tangents[delta];
         }
+        let linear = Mat3::from_mat4(world_from_local(geometry, pose, vertex));
+        let mirror = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+        world.positions.push(world_position(geometry, pose, vertex));
+        world.normals.push(unit_or(normal_matrix(linear) * normal, geometry.local_normals[v]));
+        world.tangents.push(unit_or(linear * tangent, tangent).extend(geometry.local_tangents[v].w * mirror));
     }
     world
+}
+
+/// World positions alone, one per vertex.
+pub fn world_positions(geometry: &Geometry, pose: &Pose) -> Vec<Vec3> {
+    (0..geometry.vertex_count()).map(|vertex| world_position(geometry, pose, vertex)).collect()
+}
+
+pub(super) fn world_position(geometry: &Geometry, pose: &Pose, vertex: u32) -> Vec3 {
+    let mut position = geometry.local_positions[vertex as usize];
+    for (weight, delta) in morphs(geometry, pose, vertex) {
+        position += weight * geometry.morph_positions[delta];
+    }
+    world_from_local(geometry, pose, vertex).transform_point3(position)
+}
+
+/// The vertex's morph targets as (weight, index of the displacement).
+fn morphs(geometry: &Geometry, pose: &Pose, vertex: u32) -> impl Iterator<Item = (f32, usize)> {
+    let part = geometry.parts[geometry.vertex_part[vertex as usize] as usize];
+    (0..part.morph_target_count).map(move |target| {
+        let weight = pose.morph_weights[(part.morph_weight_offset + target) as usize];
+        let delta = part.morph_offset + target * part.vertex_count + (vertex - part.vertex_offset);
+        (weight, delta as usize)
+    })
+}
+
+/// What places the vertex: its node, or the blend of the joints that hold it.
+fn world_from_local(geometry: &Geometry, pose: &Pose, vertex: u32) -> Mat4 {
+    let part = geometry.parts[geometry.vertex_part[vertex as usize] as usize];
+    match part.skin_offset {
+        None => pose.world_from_node[part.node as usize],
+        Some(first) => {
+            let influence = (first + vertex - part.vertex_offset) as usize;
+            blend(&pose.joint_palette, geometry.skin_joints[influence], geometry.skin_weights[influence])
+        }
+    }
 }
 
 /// Linear blend of palette entries.

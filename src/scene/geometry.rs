@@ -9,7 +9,7 @@ use glam::{Mat3, Vec2, Vec3, Vec4};
 use thiserror::Error;
 
 use super::pose::{Pose, PoseLayout};
-use super::{Primitive, Scene};
+use super::{Primitive, Scene, deform};
 
 /// Flat vertex and triangle arrays. Vertices and triangles of a part are contiguous, parts in node order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -75,9 +75,16 @@ pub enum GeometryError {
     OutOfMemory { what: &'static str, needed: u64, available: u64 },
     #[error("{what}: {needed} needed, at most {allowed} can be indexed; use fewer elements (--elements) or instances")]
     TooMany { what: &'static str, needed: u64, allowed: u64 },
+    #[error(
+        "node {node}: a vertex stands at {position} in world space, at most {MAX_COORDINATE:e} m a side is allowed; scale the scene down"
+    )]
+    TooFar { node: u32, position: Vec3 },
     #[error("mesh {mesh}, primitive {primitive}: {what} {value}, allowed is below {allowed}; check the loader's input")]
     OutOfRange { mesh: u32, primitive: u32, what: &'static str, value: u64, allowed: u64 },
 }
+
+/// World coordinates beyond this (metres) are refused: their squared areas no longer fit an f32.
+pub const MAX_COORDINATE: f32 = 1e9;
 
 /// Counts that decide the memory of a [`Geometry`]. Arithmetic saturates: a saturated count is refused.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -98,7 +105,7 @@ impl GeometryCounts {
     /// What [`Geometry::flatten`] will hold.
     pub fn of(scene: &Scene) -> Self {
         let mut counts = Self::default();
-        for (_, _, primitive, skinned) in drawn(scene) {
+        for Drawn { primitive, skinned, .. } in drawn(scene) {
             let vertices = primitive.positions.len() as u64;
             let deltas = vertices.saturating_mul(primitive.morph_targets.len() as u64);
             counts.parts += 1;
@@ -144,16 +151,27 @@ impl GeometryCounts {
     }
 }
 
-/// Every drawn (node index, primitive index, primitive, is it skinned), in node order.
-fn drawn(scene: &Scene) -> impl Iterator<Item = (usize, usize, &Primitive, bool)> {
-    scene.nodes.iter().enumerate().flat_map(move |(index, node)| {
-        let mesh = node.mesh.and_then(|mesh| scene.meshes.get(mesh as usize));
-        let has_skin = node.skin.and_then(|skin| scene.skins.get(skin as usize)).is_some_and(|s| !s.joints.is_empty());
-        mesh.into_iter().flat_map(|mesh| mesh.primitives.iter().enumerate()).filter_map(move |(slot, primitive)| {
-            let empty = primitive.positions.is_empty() || primitive.triangles.is_empty();
+struct Drawn<'a> {
+    node: usize,
+    mesh: u32,
+    /// Index within the mesh.
+    slot: usize,
+    primitive: &'a Primitive,
+    skinned: bool,
+}
+
+/// Every drawn (node, primitive) pair, in node order.
+fn drawn(scene: &Scene) -> impl Iterator<Item = Drawn<'_>> {
+    scene.nodes.iter().enumerate().flat_map(move |(node, described)| {
+        let mesh = described.mesh.unwrap_or(u32::MAX);
+        let primitives = scene.meshes.get(mesh as usize).map_or(&[][..], |mesh| &mesh.primitives);
+        let skin = described.skin.and_then(|skin| scene.skins.get(skin as usize));
+        let has_joints = skin.is_some_and(|skin| !skin.joints.is_empty());
+        primitives.iter().enumerate().filter_map(move |(slot, primitive)| {
             let count = primitive.positions.len();
-            let skinned = has_skin && primitive.joints.len() == count && primitive.joint_weights.len() == count;
-            (!empty).then_some((index, slot, primitive, skinned))
+            let empty = count == 0 || primitive.triangles.is_empty();
+            let skinned = has_joints && primitive.joints.len() == count && primitive.joint_weights.len() == count;
+            (!empty).then_some(Drawn { node, mesh, slot, primitive, skinned })
         })
     })
 }
@@ -167,10 +185,22 @@ impl Geometry {
         let rest = Pose::rest(scene);
 
         let mut geometry = Self::with_capacity(&counts);
-        for (node, slot, primitive, skinned) in drawn(scene) {
-            geometry.push_part(scene, &layout, &rest, node, slot, primitive, skinned)?;
+        for drawn in drawn(scene) {
+            geometry.push_part(scene, &layout, &rest, drawn)?;
         }
+        geometry.check_extent(&rest)?;
         Ok(geometry)
+    }
+
+    /// Refuses vertices too far away to compute with, or not finite at all, at rest.
+    fn check_extent(&self, rest: &Pose) -> Result<(), GeometryError> {
+        for (vertex, &part) in self.vertex_part.iter().enumerate() {
+            let position = deform::world_position(self, rest, vertex as u32);
+            if position.is_nan() || position.abs().max_element() > MAX_COORDINATE {
+                return Err(GeometryError::TooFar { node: self.parts[part as usize].node, position });
+            }
+        }
+        Ok(())
     }
 
     pub fn vertex_count(&self) -> u32 {
@@ -212,19 +242,13 @@ impl Geometry {
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn push_part(
         &mut self,
         scene: &Scene,
         layout: &PoseLayout,
         rest: &Pose,
-        node: usize,
-        slot: usize,
-        primitive: &Primitive,
-        skinned: bool,
+        Drawn { node, mesh, slot, primitive, skinned }: Drawn,
     ) -> Result<(), GeometryError> {
-        let described = &scene.nodes[node];
-        let mesh = described.mesh.unwrap_or(0);
         let count = primitive.positions.len();
         let part_index = self.parts.len() as u32;
         let out_of_range = |what, value, allowed| {
@@ -252,7 +276,7 @@ impl Geometry {
             morph_offset: self.morph_positions.len() as u32,
             morph_weight_offset: layout.weight_offset[node],
         };
-        if skinned && let Some(skin) = described.skin {
+        if skinned && let Some(skin) = scene.nodes[node].skin {
             let (first, joint_count) = (layout.palette_offset[skin as usize], scene.skins[skin as usize].joints.len());
             part.skin_offset = Some(self.skin_joints.len() as u32);
             self.push_influences(primitive, first, joint_count as u32);

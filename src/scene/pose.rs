@@ -4,7 +4,7 @@
 //! array; [`super::geometry::Geometry`] stores the same offsets in its parts. Nothing here touches vertices:
 //! see [`super::deform`].
 
-use glam::{Mat3, Mat4, Vec3};
+use glam::{Mat3, Mat4, Quat, Vec3};
 
 use super::{LightKind, Node, Projection, Scene, Transform};
 
@@ -93,7 +93,7 @@ pub struct PosedCamera {
 }
 
 impl Pose {
-    /// The scene as the file places it, no clip playing.
+    /// The scene as the file places it, no clip playing. `Pose::at` (module [`super::animation`]) plays them.
     pub fn rest(scene: &Scene) -> Self {
         let local: Vec<Transform> = scene.nodes.iter().map(|node| node.transform).collect();
         Self::compose(scene, 0.0, &local, rest_weights(scene))
@@ -126,6 +126,8 @@ impl Transform {
     pub fn matrix(&self) -> Mat4 {
         match *self {
             Self::Trs { translation, rotation, scale } => {
+                // A rotation off unit length would scale; a zero one would be no transform at all.
+                let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { Quat::IDENTITY };
                 Mat4::from_scale_rotation_translation(scale, rotation, translation)
             }
             Self::Matrix(matrix) => matrix,

@@ -1,0 +1,6 @@
+//! The plain-data side of the scene beyond the loader, on hand-made scenes: pose, geometry, tessellation,
+//! environment, camera.
+
+mod geometry;
+mod made;
+mod pose;
