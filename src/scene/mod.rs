@@ -9,6 +9,7 @@
 
 pub mod adjacency;
 pub mod animation;
+pub mod camera;
 pub mod deform;
 pub mod geometry;
 pub mod pose;

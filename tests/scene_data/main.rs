@@ -1,6 +1,7 @@
 //! The plain-data side of the scene beyond the loader, on hand-made scenes: pose, geometry, tessellation,
 //! environment, camera.
 
+mod camera;
 mod geometry;
 mod made;
 mod pose;
