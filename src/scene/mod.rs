@@ -9,10 +9,12 @@
 
 pub mod adjacency;
 pub mod animation;
+pub mod builtin;
 pub mod camera;
 pub mod deform;
 pub mod geometry;
 pub mod pose;
+pub mod shapes;
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 

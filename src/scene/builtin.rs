@@ -1,0 +1,94 @@
+//! The scenes that come with the program, by name: `builtin:NAME` on the command line.
+//!
+//! Most are .glb files in `assets/`, made by `tools/make_scenes` and kept inside the binary.
+
+use thiserror::Error;
+
+/// What a scene argument must start with to name a built-in scene.
+pub const PREFIX: &str = "builtin:";
+
+/// A scene that comes with the program.
+#[derive(Debug, Clone, Copy)]
+pub struct Builtin {
+    pub name: &'static str,
+    /// One line for listings.
+    pub description: &'static str,
+    source: Source,
+}
+
+/// What stands behind a built-in name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Source {
+    /// The bytes of a .glb file.
+    File(&'static [u8]),
+}
+
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum BuiltinError {
+    #[error("there is no built-in scene '{name}'; choose one of: {}", names())]
+    UnknownName { name: String },
+    #[error("built-in scene '{name}' takes no parameters, but '{parameters}' was given; write builtin:{name}")]
+    NoParameters { name: String, parameters: String },
+}
+
+macro_rules! file {
+    ($name:literal, $description:literal) => {
+        Builtin {
+            name: $name,
+            description: $description,
+            source: Source::File(include_bytes!(concat!("../../assets/", $name, ".glb"))),
+        }
+    };
+}
+
+/// All built-in scenes, simplest first.
+pub static BUILTINS: [Builtin; 6] = [
+    file!("cornell-box", "the Cornell box as measured: two boxes under an area light"),
+    file!("cornell-empty", "the Cornell box without its boxes"),
+    file!("furnace", "closed room, albedo 0.5 and radiance 1 everywhere: after k bounces 2 - 2^-k"),
+    file!("parallel-plates", "unit squares face to face at distance 1: form factor 0.199825"),
+    file!("perpendicular-plates", "unit squares sharing an edge: form factor 0.200044"),
+    file!("two-rooms", "a lit and a dark room with a closed door between them"),
+];
+
+/// Finds a scene by `NAME` or `NAME?PARAMETERS` (without the prefix).
+pub fn resolve(name: &str) -> Result<Source, BuiltinError> {
+    let (stem, parameters) = name.split_once('?').unwrap_or((name, ""));
+    let found = BUILTINS.iter().find(|b| b.name == stem);
+    let builtin = found.ok_or_else(|| BuiltinError::UnknownName { name: stem.into() })?;
+    match builtin.source {
+        Source::File(_) if !parameters.is_empty() => {
+            Err(BuiltinError::NoParameters { name: stem.into(), parameters: parameters.into() })
+        }
+        source => Ok(source),
+    }
+}
+
+fn names() -> String {
+    BUILTINS.map(|b| b.name).join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_resolves() {
+        for builtin in &BUILTINS {
+            assert_eq!(resolve(builtin.name), Ok(builtin.source));
+            assert!(!builtin.description.contains('\n'), "{} has a description of one line", builtin.name);
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_lists_the_choices() {
+        let message = resolve("cornel-box").unwrap_err().to_string();
+        assert!(message.contains("cornel-box") && message.contains("cornell-box"), "{message}");
+    }
+
+    #[test]
+    fn parameters_are_refused_where_there_are_none() {
+        let message = resolve("furnace?size=3").unwrap_err().to_string();
+        assert!(message.contains("size=3"), "{message}");
+    }
+}

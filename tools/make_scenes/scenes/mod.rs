@@ -1,0 +1,18 @@
+//! What each built-in scene is made of, one file a scene or small family.
+
+mod cornell;
+mod document;
+mod plates;
+mod rooms;
+
+use document::Document;
+
+/// File stem and maker of every scene that is kept as a file.
+pub const ALL: [(&str, fn() -> Document); 6] = [
+    ("cornell-box", cornell::with_boxes),
+    ("cornell-empty", cornell::empty),
+    ("furnace", rooms::furnace),
+    ("parallel-plates", plates::parallel),
+    ("perpendicular-plates", plates::perpendicular),
+    ("two-rooms", rooms::two_rooms),
+];
