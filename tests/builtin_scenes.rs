@@ -84,7 +84,7 @@ fn check_primitive(glb: &Glb, primitive: &Value, whose: &str) -> (usize, usize) 
         assert!(area_normal.length() > 1e-9, "{whose}: triangle {triangle:?} has no area");
         let shading = normals[a] + normals[b] + normals[c];
         assert!(area_normal.dot(shading) > 0.0, "{whose}: triangle {triangle:?} is wound against its normals");
-        [a, b, c].map(|i| used[i] = true);
+        [a, b, c].into_iter().for_each(|i| used[i] = true);
     }
     assert!(used.iter().all(|u| *u), "{whose}: every vertex is used");
     (indices.len() / 3, positions.len())

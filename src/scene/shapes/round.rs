@@ -128,7 +128,7 @@ impl Shape {
         let start = tangent(0);
         let mut side = start.cross(if start.y.abs() < 0.9 { Vec3::Y } else { Vec3::Z }).normalize_or(Vec3::X);
         let rows = if closed { n - 1 } else { n };
-        for i in 0..rows {
+        for (i, &centre) in path.iter().enumerate().take(rows) {
             let along = tangent(i);
             side = (side - along * side.dot(along)).normalize_or(Vec3::X);
             let up = side.cross(along);
@@ -136,7 +136,7 @@ impl Shape {
             for k in 0..segments {
                 let c = circle(k as f32 / segments as f32);
                 let normal = (side * (c.x * r.y) + up * (c.y * r.x)).normalize_or(along);
-                shape.vertex(path[i] + side * (c.x * r.x) + up * (c.y * r.y), normal, Vec2::ZERO);
+                shape.vertex(centre + side * (c.x * r.x) + up * (c.y * r.y), normal, Vec2::ZERO);
             }
         }
         let ring = |row: usize, k: usize| (row % rows * segments + k % segments) as u32;

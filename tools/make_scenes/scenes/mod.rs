@@ -7,8 +7,10 @@ mod rooms;
 
 use document::Document;
 
+type Maker = fn() -> Document;
+
 /// File stem and maker of every scene that is kept as a file.
-pub const ALL: [(&str, fn() -> Document); 6] = [
+pub const ALL: [(&str, Maker); 6] = [
     ("cornell-box", cornell::with_boxes),
     ("cornell-empty", cornell::empty),
     ("furnace", rooms::furnace),
