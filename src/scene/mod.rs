@@ -12,6 +12,7 @@ pub mod animation;
 pub mod builtin;
 pub mod camera;
 pub mod deform;
+pub mod environment;
 pub mod geometry;
 pub mod pose;
 pub mod shapes;

@@ -2,6 +2,7 @@
 //! environment, camera.
 
 mod camera;
+mod environment;
 mod geometry;
 mod made;
 mod pose;
