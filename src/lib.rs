@@ -1,2 +1,4 @@
 //! **linklight**: a Vulkan-native global-illumination renderer.
+pub mod gpu;
 pub mod scene;
+pub mod stages;

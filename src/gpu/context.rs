@@ -1,0 +1,282 @@
+//! The front door of the GPU layer: one [`Context`] per device, from which everything is made.
+
+use super::Buffer;
+use super::device::{Device, Limits, MemoryUse, lock};
+use super::error::{Checked, GpuError};
+use super::features::OptionalFeatures;
+use super::image::{Image, ImageDescription, Sampler, SamplerDescription, TextureTable};
+use super::instance::Instance;
+use super::pipelines::Pipelines;
+use super::profiler::{ClockPair, PassRecord};
+use super::recorder::{CommandSlot, PASSES_PER_POOL, Recorder};
+use super::selection::{self, DeviceInfo};
+use ash::vk;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+/// How a context is made.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Device index or a part of its name; the fastest kind of device where empty.
+    pub gpu: Option<String>,
+    /// Run core and synchronization validation; messages are collected.
+    pub validation: bool,
+    /// A full barrier before every pass. If a picture changes by it, a hazard was missed.
+    pub full_barriers: bool,
+    /// Leave every barrier out. Only to show that validation sees it.
+    pub skip_barriers: bool,
+    /// Count invocations and primitives per pass where the device can.
+    pub statistics: bool,
+    /// Pretend to lack every optional feature.
+    pub no_optional_features: bool,
+    /// Pretend that this is the largest buffer a pass can bind, bytes.
+    pub max_storage_buffer_bytes: Option<u64>,
+    /// Where the driver's pipeline cache is kept; nowhere where empty.
+    pub pipeline_cache: Option<PathBuf>,
+    /// Give up on a submission after this long, seconds; 0 takes the default of ten minutes.
+    pub timeout_seconds: u64,
+}
+
+/// Pipeline statistics in bit order; see `STATISTICS` of the recorder for their names.
+pub(super) const STATISTIC_FLAGS: vk::QueryPipelineStatisticFlags = vk::QueryPipelineStatisticFlags::from_raw(
+    vk::QueryPipelineStatisticFlags::CLIPPING_PRIMITIVES.as_raw()
+        | vk::QueryPipelineStatisticFlags::FRAGMENT_SHADER_INVOCATIONS.as_raw()
+        | vk::QueryPipelineStatisticFlags::COMPUTE_SHADER_INVOCATIONS.as_raw(),
+);
+
+/// One device and all that is made on it.
+pub struct Context {
+    pub(super) options: Options,
+    pub(super) pipelines: Pipelines,
+    pub(super) queue_lock: Mutex<()>,
+    slots: Mutex<Vec<CommandSlot>>,
+    records: Mutex<Vec<PassRecord>>,
+    // Dropped last: everything above is made on it.
+    pub(super) device: Arc<Device>,
+}
+
+impl Context {
+    /// Opens the wanted (or best) device. Fails by name of what is missing.
+    pub fn new(options: Options) -> Result<Self, GpuError> {
+        let instance = Arc::new(Instance::new(options.validation)?);
+        let candidate = selection::choose(selection::candidates(&instance), options.gpu.as_deref())?;
+        let enabled =
+            if options.no_optional_features { OptionalFeatures::default() } else { candidate.support.optional };
+        let mut device = Device::new(instance, candidate, enabled)?;
+        if let Some(bytes) = options.max_storage_buffer_bytes {
+            device.limits.storage_buffer_bytes = device.limits.storage_buffer_bytes.min(bytes);
+        }
+        let device = Arc::new(device);
+        tracing::info!("device {} {} ({})", device.info.index, device.info.name, device.info.driver);
+        let pipelines = Pipelines::new(&device, options.pipeline_cache.clone())?;
+        Ok(Self {
+            options,
+            pipelines,
+            queue_lock: Mutex::default(),
+            slots: Mutex::default(),
+            records: Mutex::default(),
+            device,
+        })
+    }
+
+    pub fn info(&self) -> &DeviceInfo {
+        &self.device.info
+    }
+
+    /// Optional features that are on.
+    pub fn features(&self) -> OptionalFeatures {
+        self.device.optional
+    }
+
+    pub fn limits(&self) -> Limits {
+        self.device.limits
+    }
+
+    /// Validation messages so far (warnings and errors), oldest first.
+    pub fn validation_messages(&self) -> Vec<String> {
+        lock(&self.device.instance.messages).clone()
+    }
+
+    /// True when core and synchronization validation listen.
+    pub fn validates(&self) -> bool {
+        self.device.instance.validation
+    }
+
+    /// A buffer of `len` elements with undefined content. Names are `owner/what`.
+    pub fn buffer<T>(&self, name: &str, len: usize) -> Result<Buffer<T>, GpuError> {
+        Buffer::new(&self.device, name, len)
+    }
+
+    pub fn image(&self, description: &ImageDescription<'_>) -> Result<Image, GpuError> {
+        let image = Image::new(&self.device, description)?;
+        let mut recorder = self.recorder("new image")?;
+        recorder.initialize_image(&image);
+        recorder.submit()?;
+        Ok(image)
+    }
+
+    pub fn sampler(&self, name: &str, description: SamplerDescription) -> Result<Sampler, GpuError> {
+        Sampler::new(&self.device, name, description)
+    }
+
+    /// Binds `images[i]` through `samplers[s]` as texture `t` for `textures[t] = (i, s)`.
+    pub fn texture_table(
+        &self,
+        images: Vec<Image>,
+        samplers: Vec<Sampler>,
+        textures: &[(usize, usize)],
+    ) -> Result<TextureTable, GpuError> {
+        TextureTable::new(&self.device, self.pipelines.texture_layout, images, samplers, textures)
+    }
+
+    /// Starts recording under the label `name`.
+    pub fn recorder(&self, name: &str) -> Result<Recorder<'_>, GpuError> {
+        Recorder::new(self, name)
+    }
+
+    /// Takes all pass records since the last call, in submission order.
+    pub fn take_records(&self) -> Vec<PassRecord> {
+        std::mem::take(&mut *lock(&self.records))
+    }
+
+    /// Device memory by owner (the part of names before the first '/').
+    pub fn memory_by_owner(&self) -> BTreeMap<String, MemoryUse> {
+        self.device.memory_by_owner()
+    }
+
+    /// Device memory that may still be allocated, bytes.
+    pub fn available_bytes(&self) -> u64 {
+        self.device.available_bytes()
+    }
+
+    /// Device and host clock read together, where the device can.
+    pub fn calibrate(&self) -> Option<ClockPair> {
+        let extension = self.device.calibrated_timestamps.as_ref()?;
+        let domain = |time_domain| vk::CalibratedTimestampInfoKHR::default().time_domain(time_domain);
+        let infos = [domain(vk::TimeDomainKHR::DEVICE), domain(vk::TimeDomainKHR::CLOCK_MONOTONIC)];
+        // SAFETY: both domains are asked for by name; a device that lacks one answers with an error.
+        let (values, max_deviation_ns) = unsafe { extension.get_calibrated_timestamps(&infos) }.ok()?;
+        let device_ns = (values[0] as f64 * self.device.limits.timestamp_period_ns) as u64;
+        Some(ClockPair { device_ns, host_ns: values[1], max_deviation_ns })
+    }
+
+    /// Waits until submission `value` is complete.
+    pub(super) fn wait(&self, value: u64, last_pass: &str) -> Result<(), GpuError> {
+        let seconds = if self.options.timeout_seconds == 0 { 600 } else { self.options.timeout_seconds };
+        let (semaphores, values) = ([self.device.timeline], [value]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore is alive.
+        match unsafe { self.device.raw.wait_semaphores(&info, seconds.saturating_mul(1_000_000_000)) } {
+            Ok(()) => {
+                self.device.completed.fetch_max(value, Ordering::AcqRel);
+                Ok(())
+            }
+            Err(vk::Result::TIMEOUT) => Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds }),
+            Err(error) => Err(self.with_fault(GpuError::from_call("vkWaitSemaphores", error, last_pass))),
+        }
+    }
+
+    /// Adds what the driver tells of a device loss.
+    pub(super) fn with_fault(&self, error: GpuError) -> GpuError {
+        match (error, &self.device.device_fault) {
+            (GpuError::DeviceLost { last_pass, .. }, Some(extension)) => {
+                let mut counts = vk::DeviceFaultCountsEXT::default();
+                let mut info = vk::DeviceFaultInfoEXT::default();
+                // SAFETY: with zero counts only the description is written, into `info` itself.
+                let told = unsafe {
+                    (extension.fp().get_device_fault_info_ext)(self.device.raw.handle(), &mut counts, &mut info)
+                };
+                let text = info.description_as_c_str().map(|d| d.to_string_lossy().into_owned()).unwrap_or_default();
+                let known = matches!(told, vk::Result::SUCCESS | vk::Result::INCOMPLETE) && !text.is_empty();
+                GpuError::DeviceLost { last_pass, fault: if known { format!(" ({text})") } else { String::new() } }
+            }
+            (error, _) => error,
+        }
+    }
+
+    pub(super) fn append_records(&self, records: Vec<PassRecord>) {
+        lock(&self.records).extend(records);
+    }
+
+    /// A command slot with reset command pool and queries.
+    pub(super) fn take_slot(&self) -> Result<CommandSlot, GpuError> {
+        let raw = &self.device.raw;
+        if let Some(slot) = lock(&self.slots).pop() {
+            // SAFETY: slots are given back only when their submission is complete.
+            unsafe {
+                raw.reset_command_pool(slot.pool, vk::CommandPoolResetFlags::empty())
+                    .checked("vkResetCommandPool", "start")?;
+                for &pool in &slot.timestamps {
+                    raw.reset_query_pool(pool, 0, 2 * PASSES_PER_POOL);
+                }
+                for &pool in &slot.statistics {
+                    raw.reset_query_pool(pool, 0, PASSES_PER_POOL);
+                }
+            }
+            return Ok(slot);
+        }
+        let info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(self.device.queue_family)
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        // SAFETY: complete create infos.
+        unsafe {
+            let pool = raw.create_command_pool(&info, None).checked("vkCreateCommandPool", "start")?;
+            self.device.set_name(pool, "commands");
+            let info = vk::CommandBufferAllocateInfo::default()
+                .command_pool(pool)
+                .level(vk::CommandBufferLevel::PRIMARY)
+                .command_buffer_count(1);
+            let commands = raw.allocate_command_buffers(&info).checked("vkAllocateCommandBuffers", "start")?[0];
+            Ok(CommandSlot { pool, commands, timestamps: Vec::new(), statistics: Vec::new() })
+        }
+    }
+
+    /// Makes query pools up to index `pool`.
+    pub(super) fn grow_slot(&self, slot: &mut CommandSlot, pool: usize) -> Result<(), GpuError> {
+        let raw = &self.device.raw;
+        while slot.timestamps.len() <= pool {
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(2 * PASSES_PER_POOL);
+            // SAFETY: complete create infos; fresh pools are reset before use.
+            unsafe {
+                let queries = raw.create_query_pool(&info, None).checked("vkCreateQueryPool", "timestamps")?;
+                self.device.set_name(queries, "timestamps");
+                raw.reset_query_pool(queries, 0, 2 * PASSES_PER_POOL);
+                slot.timestamps.push(queries);
+                if self.options.statistics && self.device.optional.pipeline_statistics {
+                    let info = vk::QueryPoolCreateInfo::default()
+                        .query_type(vk::QueryType::PIPELINE_STATISTICS)
+                        .pipeline_statistics(STATISTIC_FLAGS)
+                        .query_count(PASSES_PER_POOL);
+                    let queries = raw.create_query_pool(&info, None).checked("vkCreateQueryPool", "statistics")?;
+                    self.device.set_name(queries, "statistics");
+                    raw.reset_query_pool(queries, 0, PASSES_PER_POOL);
+                    slot.statistics.push(queries);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn give_slot(&self, slot: CommandSlot) {
+        lock(&self.slots).push(slot);
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: the device is drained before its command and query pools go.
+        unsafe {
+            let raw = &self.device.raw;
+            let _ = raw.device_wait_idle();
+            self.device.completed.store(self.device.submitted.load(Ordering::Acquire), Ordering::Release);
+            for slot in lock(&self.slots).drain(..) {
+                raw.destroy_command_pool(slot.pool, None);
+                slot.timestamps.iter().chain(&slot.statistics).for_each(|&pool| raw.destroy_query_pool(pool, None));
+            }
+        }
+    }
+}

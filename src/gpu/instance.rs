@@ -1,0 +1,152 @@
+//! The Vulkan instance: loader, layers, and validation messages caught for tests and the log.
+
+use super::error::{Checked, GpuError};
+use ash::{ext, vk};
+use std::ffi::{CStr, c_void};
+use std::sync::{Arc, Mutex};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Messages of severity warning and error, in order.
+pub(super) type MessageLog = Arc<Mutex<Vec<String>>>;
+
+/// Loader, instance and debug messenger; destroyed last.
+pub(super) struct Instance {
+    pub raw: ash::Instance,
+    /// True when core and synchronization validation run.
+    pub validation: bool,
+    pub messages: MessageLog,
+    /// Names and labels can be given (a layer or capture tool listens).
+    pub has_debug_utils: bool,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    // The callback's user data; freed after the messenger.
+    _callback_log: Box<MessageLog>,
+    _entry: ash::Entry,
+}
+
+impl Instance {
+    /// `validation` asks for the Khronos layer with core and synchronization checks; a missing layer is an error,
+    /// so that silence always means that somebody listened.
+    pub fn new(validation: bool) -> Result<Self, GpuError> {
+        // SAFETY: loading the Vulkan loader runs its initialisers, as every Vulkan program does.
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
+        // SAFETY: plain queries and creation with structs that outlive the calls; the log box outlives the messenger.
+        unsafe {
+            let layers =
+                entry.enumerate_instance_layer_properties().checked("vkEnumerateInstanceLayerProperties", "start")?;
+            let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
+            if validation && !has_layer {
+                return Err(GpuError::NoLoader(
+                    "--validate needs the layer VK_LAYER_KHRONOS_validation, which is not installed (tools/setup --test installs it)".into(),
+                ));
+            }
+            let available = entry
+                .enumerate_instance_extension_properties(None)
+                .checked("vkEnumerateInstanceExtensionProperties", "start")?;
+            let has_debug_utils =
+                validation || available.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+
+            let mut extensions = Vec::new();
+            if has_debug_utils {
+                extensions.push(ext::debug_utils::NAME.as_ptr());
+            }
+            let mut layer_names = Vec::new();
+            if validation {
+                layer_names.push(VALIDATION_LAYER.as_ptr());
+                extensions.push(ext::validation_features::NAME.as_ptr());
+            }
+
+            let app = vk::ApplicationInfo::default()
+                .application_name(c"linklight")
+                .engine_name(c"linklight")
+                .api_version(vk::API_VERSION_1_3);
+            // Newer layers see hazards between shader accesses only when asked to by this setting; older layers and
+            // loaders do not know the struct and pass over it (so the extension of that name is not enabled).
+            let on = vk::TRUE;
+            let mut heuristic = vk::LayerSettingEXT::default()
+                .layer_name(VALIDATION_LAYER)
+                .setting_name(c"syncval_shader_accesses_heuristic")
+                .ty(vk::LayerSettingTypeEXT::BOOL32);
+            heuristic.value_count = 1;
+            heuristic.p_values = (&raw const on).cast();
+            let settings = [heuristic];
+            let mut layer_settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
+            let enables = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enables);
+            let mut create = vk::InstanceCreateInfo::default()
+                .application_info(&app)
+                .enabled_layer_names(&layer_names)
+                .enabled_extension_names(&extensions);
+            if validation {
+                create = create.push_next(&mut features).push_next(&mut layer_settings);
+            }
+            let raw = entry
+                .create_instance(&create, None)
+                .map_err(|e| GpuError::NoLoader(format!("vkCreateInstance: {e:?}")))?;
+
+            let messages = MessageLog::default();
+            let callback_log = Box::new(messages.clone());
+            let messenger = if validation {
+                let loader = ext::debug_utils::Instance::new(&entry, &raw);
+                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                    .message_severity(
+                        vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                    )
+                    .message_type(
+                        vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+                    )
+                    .pfn_user_callback(Some(on_message))
+                    .user_data(std::ptr::from_ref::<MessageLog>(&callback_log).cast_mut().cast::<c_void>());
+                let messenger = loader
+                    .create_debug_utils_messenger(&info, None)
+                    .checked("vkCreateDebugUtilsMessengerEXT", "start")?;
+                Some((loader, messenger))
+            } else {
+                None
+            };
+            Ok(Self {
+                raw,
+                validation,
+                messages,
+                has_debug_utils,
+                messenger,
+                _callback_log: callback_log,
+                _entry: entry,
+            })
+        }
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: devices hold an Arc of the instance, so none is left; the messenger goes first.
+        unsafe {
+            if let Some((loader, messenger)) = &self.messenger {
+                loader.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}
+
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    log: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes valid callback data, and our user data is the boxed log that outlives the messenger.
+    let (text, log) = unsafe {
+        let text = (*data).message_as_c_str().map(|m| m.to_string_lossy().into_owned()).unwrap_or_default();
+        (text, &*log.cast::<MessageLog>())
+    };
+    if severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR) {
+        tracing::error!("validation: {text}");
+    } else {
+        tracing::warn!("validation: {text}");
+    }
+    if let Ok(mut log) = log.lock() {
+        log.push(text);
+    }
+    vk::FALSE
+}

@@ -1,0 +1,50 @@
+//! The Vulkan layer: hand-written, little of it, and the only folder with `unsafe` and `vk::`.
+//!
+//! - [`Context`] is one device; buffers, images and recorders are made from it.
+//! - GLSL is the single source of layouts: [`shaders`] holds, for every shader, a generated [`Pass`] struct whose
+//!   fields are the shader's bindings by name.
+//! - [`Recorder::dispatch`] and [`Recorder::draw`] are the only ways to run a pass: each labels, times, counts and
+//!   synchronises it from the access that the shader declares.
+//!
+//! What it does not do: no render graph, no asynchronous queues, no buffer device addresses (captures hide them).
+
+mod acceleration;
+mod buffer;
+mod context;
+mod device;
+mod error;
+mod features;
+mod hazards;
+mod image;
+mod instance;
+mod pass;
+mod pipelines;
+mod profiler;
+mod recorder;
+pub mod reflection;
+mod reload;
+mod selection;
+pub mod shader_compiler;
+mod transfer;
+
+/// Passes and buffer structs made from the shaders by the build script.
+#[allow(missing_docs)]
+pub mod shaders {
+    include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
+}
+
+use buffer::RawBuffer;
+
+pub use acceleration::AccelerationStructure;
+pub use buffer::Buffer;
+pub use context::{Context, Options};
+pub use device::{Limits, MAX_TEXTURES, MemoryUse};
+pub use error::GpuError;
+pub use features::OptionalFeatures;
+pub use image::{AddressMode, Format, Image, ImageDescription, Sampler, SamplerDescription, Shape, TextureTable};
+pub use pass::{BindingInfo, Bindings, Pass, Program, ResourceKind, Sampled, Stage, StageKind};
+pub use pipelines::{Cull, RasterState};
+pub use profiler::{ClockPair, Cost, PassRecord};
+pub use recorder::{Load, Recorder, Target, Threads};
+pub use reload::{Reload, ShaderWatcher, reload};
+pub use selection::{DeviceInfo, list_devices};

@@ -1,0 +1,140 @@
+//! A pass: the static description of a program (made from its shader at build time) and one use of it with its
+//! buffers, parameters and constants.
+
+use super::{AccelerationStructure, Buffer, Image, Sampler, TextureTable};
+use ash::vk;
+
+/// One program: a compute shader, or a vertex and a fragment shader. Written by the build script.
+#[derive(Debug)]
+pub struct Program {
+    /// The shader file without extension, `gather/links`: label, timing row and test name too.
+    pub name: &'static str,
+    pub stages: &'static [Stage],
+    /// Bindings of set 0 in ascending order.
+    pub bindings: &'static [BindingInfo],
+    pub push_constant_bytes: u32,
+    /// Threads per workgroup (compute).
+    pub workgroup: [u32; 3],
+    /// Set 1 is the scene's texture table.
+    pub uses_textures: bool,
+}
+
+/// One compiled shader file of a program.
+#[derive(Debug)]
+pub struct Stage {
+    pub kind: StageKind,
+    /// Relative to `glsl/`.
+    pub file: &'static str,
+    /// Little-endian words.
+    pub spirv: &'static [u8],
+    /// Fingerprint of the reflected interface.
+    pub interface: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StageKind {
+    Compute,
+    Vertex,
+    Fragment,
+}
+
+#[derive(Debug)]
+pub struct BindingInfo {
+    pub name: &'static str,
+    pub binding: u32,
+    pub kind: ResourceKind,
+    pub reads: bool,
+    pub writes: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ResourceKind {
+    Buffer,
+    SampledImage,
+    StorageImage,
+    AccelerationStructure,
+}
+
+impl Program {
+    /// True for a compute program.
+    pub fn is_compute(&self) -> bool {
+        self.stages.iter().any(|s| s.kind == StageKind::Compute)
+    }
+}
+
+/// One use of a program. Implemented by generated structs whose fields are the shader's bindings.
+pub trait Pass {
+    const PROGRAM: &'static Program;
+    /// Hands over every binding in ascending order, then push constants and specialisation constants.
+    fn bind<'b>(&'b self, bindings: &mut Bindings<'b>);
+}
+
+/// An image with the sampler it is read by.
+#[derive(Clone, Copy)]
+pub struct Sampled<'a> {
+    pub image: &'a Image,
+    pub sampler: &'a Sampler,
+}
+
+/// What a pass binds, collected by [`Pass::bind`].
+#[derive(Default)]
+pub struct Bindings<'b> {
+    pub(super) resources: Vec<Resource>,
+    pub(super) push_constants: &'b [u8],
+    /// (id, 32 bits).
+    pub(super) constants: Vec<(u32, u32)>,
+    pub(super) textures: Option<&'b TextureTable>,
+}
+
+/// One bound object: what the descriptor needs and what the hazard check needs.
+pub(super) struct Resource {
+    /// Unique per object; see [`super::device::Device::new_id`].
+    pub id: u64,
+    pub bytes: u64,
+    pub handle: Handle,
+}
+
+pub(super) enum Handle {
+    Buffer(vk::DescriptorBufferInfo),
+    Image(vk::DescriptorImageInfo),
+    AccelerationStructure(vk::AccelerationStructureKHR),
+}
+
+impl<'b> Bindings<'b> {
+    pub fn buffer<T>(&mut self, buffer: &'b Buffer<T>) {
+        let info = vk::DescriptorBufferInfo::default().buffer(buffer.raw()).offset(0).range(vk::WHOLE_SIZE);
+        self.resources.push(Resource { id: buffer.id(), bytes: buffer.size_bytes(), handle: Handle::Buffer(info) });
+    }
+
+    pub fn sampled(&mut self, sampled: Sampled<'b>) {
+        let info = vk::DescriptorImageInfo::default()
+            .image_view(sampled.image.sampled_view())
+            .image_layout(vk::ImageLayout::GENERAL)
+            .sampler(sampled.sampler.raw());
+        let bytes = sampled.image.size_bytes();
+        self.resources.push(Resource { id: sampled.image.id(), bytes, handle: Handle::Image(info) });
+    }
+
+    pub fn storage_image(&mut self, image: &'b Image) {
+        let info =
+            vk::DescriptorImageInfo::default().image_view(image.storage_view()).image_layout(vk::ImageLayout::GENERAL);
+        self.resources.push(Resource { id: image.id(), bytes: image.size_bytes(), handle: Handle::Image(info) });
+    }
+
+    pub fn acceleration_structure(&mut self, structure: &'b AccelerationStructure) {
+        let handle = Handle::AccelerationStructure(structure.raw());
+        self.resources.push(Resource { id: structure.id(), bytes: structure.size_bytes(), handle });
+    }
+
+    pub fn textures(&mut self, table: &'b TextureTable) {
+        self.textures = Some(table);
+    }
+
+    pub fn push_constants(&mut self, bytes: &'b [u8]) {
+        self.push_constants = bytes;
+    }
+
+    pub fn constant(&mut self, id: u32, bits: u32) {
+        self.constants.push((id, bits));
+    }
+}

@@ -1,0 +1,611 @@
+//! The recorder: every pass is labelled, timed, counted and synchronised here, in one place, always.
+
+use super::context::Context;
+use super::device::lock;
+use super::error::{Checked, GpuError};
+use super::hazards::{Access, Hazards};
+use super::image::Image;
+use super::pass::{Bindings, Handle, Pass, Program};
+use super::pipelines::{Bound, RasterState, descriptor_type, stage_flags};
+use super::profiler::{Cost, PassRecord};
+use super::{Buffer, RawBuffer};
+use ash::vk;
+use std::fmt::Display;
+use std::sync::atomic::Ordering;
+
+/// Passes timed per query pool.
+pub(super) const PASSES_PER_POOL: u32 = 512;
+
+/// How many threads a dispatch runs; workgroups are counted from the shader's own size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Threads {
+    /// A list; folded into two dimensions where it is longer than one allows (shaders use `linear_index()`).
+    Linear(u32),
+    /// Pixels or other grids.
+    Grid(u32, u32, u32),
+}
+
+impl From<u32> for Threads {
+    fn from(count: u32) -> Self {
+        Self::Linear(count)
+    }
+}
+
+impl From<usize> for Threads {
+    fn from(count: usize) -> Self {
+        // A count beyond u32 cannot be indexed by a shader; no buffer of that length can be made either.
+        Self::Linear(u32::try_from(count).unwrap_or(u32::MAX))
+    }
+}
+
+impl From<[u32; 2]> for Threads {
+    fn from(size: [u32; 2]) -> Self {
+        Self::Grid(size[0], size[1], 1)
+    }
+}
+
+/// What an attachment holds before the first draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Load {
+    Keep,
+    Clear([f32; 4]),
+}
+
+/// What a raster pass draws into: images of one size.
+pub struct Target<'a> {
+    pub color: Vec<(&'a Image, Load)>,
+    /// Depth image, layer, load.
+    pub depth: Option<(&'a Image, u32, Load)>,
+}
+
+/// Device objects of one recording, reused from submission to submission.
+pub(super) struct CommandSlot {
+    pub pool: vk::CommandPool,
+    pub commands: vk::CommandBuffer,
+    /// Timestamp pools in use order.
+    pub timestamps: Vec<vk::QueryPool>,
+    /// Pipeline statistics pools, in step with `timestamps`; empty without statistics.
+    pub statistics: Vec<vk::QueryPool>,
+}
+
+struct Timed {
+    path: String,
+    name: &'static str,
+    cost: Cost,
+    threads: u64,
+    overlapped: bool,
+    is_compute: Option<bool>,
+}
+
+/// Records one command buffer and submits it. The first error is kept and returned by [`Recorder::submit`].
+pub struct Recorder<'c> {
+    context: &'c Context,
+    slot: Option<CommandSlot>,
+    scopes: Vec<String>,
+    timed: Vec<Timed>,
+    hazards: Hazards,
+    staging: Vec<RawBuffer>,
+    error: Option<GpuError>,
+}
+
+impl<'c> Recorder<'c> {
+    pub(super) fn new(context: &'c Context, name: &str) -> Result<Self, GpuError> {
+        let device = &context.device;
+        let slot = context.take_slot()?;
+        device.open_recorders.fetch_add(1, Ordering::AcqRel);
+        let recorder = Self {
+            context,
+            slot: Some(slot),
+            scopes: vec![name.to_owned()],
+            timed: Vec::new(),
+            hazards: Hazards::default(),
+            staging: Vec::new(),
+            error: None,
+        };
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the slot's command buffer is idle and freshly reset.
+        unsafe { device.raw.begin_command_buffer(recorder.commands(), &begin) }
+            .checked("vkBeginCommandBuffer", name)?;
+        device.set_name(recorder.commands(), name);
+        device.begin_label(recorder.commands(), name);
+        // What earlier submissions wrote becomes visible here.
+        recorder.barrier();
+        Ok(recorder)
+    }
+
+    fn commands(&self) -> vk::CommandBuffer {
+        self.slot.as_ref().map_or(vk::CommandBuffer::null(), |s| s.commands)
+    }
+
+    /// Runs `body` inside a nested label.
+    pub fn scope<R>(&mut self, name: impl Display, body: impl FnOnce(&mut Self) -> R) -> R {
+        let name = name.to_string();
+        self.context.device.begin_label(self.commands(), &name);
+        self.scopes.push(name);
+        let result = body(self);
+        self.scopes.pop();
+        self.context.device.end_label(self.commands());
+        result
+    }
+
+    /// Lets the passes in `body` run without barriers between them; `why` says what makes that right
+    /// (they write disjoint parts, say) and shows in captures.
+    pub fn overlap<R>(&mut self, why: &str, body: impl FnOnce(&mut Self) -> R) -> R {
+        self.barrier();
+        self.hazards.clear();
+        let outer = self.hazards.is_overlapping();
+        self.hazards.set_overlapping(true);
+        let result = self.scope(format_args!("overlap: {why}"), body);
+        self.hazards.set_overlapping(outer);
+        result
+    }
+
+    /// Runs a compute pass over `threads`; none at all for zero threads.
+    pub fn dispatch<P: Pass>(&mut self, pass: &P, threads: impl Into<Threads>) {
+        self.dispatch_counted(pass, threads, None);
+    }
+
+    /// As [`Self::dispatch`], with the bytes its algorithm moves.
+    pub fn dispatch_counted<P: Pass>(&mut self, pass: &P, threads: impl Into<Threads>, cost: Option<Cost>) {
+        let mut bindings = Bindings::default();
+        pass.bind(&mut bindings);
+        let (groups, count) = match self.groups(P::PROGRAM, threads.into()) {
+            Ok(Some(groups)) => groups,
+            Ok(None) => return,
+            Err(error) => return self.fail(error),
+        };
+        self.compute(P::PROGRAM, &bindings, cost, count, |device, commands| {
+            // SAFETY: the pipeline and all its bindings are bound; the group counts are within limits.
+            unsafe { device.raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]) }
+        });
+    }
+
+    /// Runs a compute pass over the workgroup counts (x, y, z) that an earlier pass left at `groups[index..index + 3]`.
+    pub fn dispatch_indirect<P: Pass>(&mut self, pass: &P, groups: &Buffer<u32>, index: usize) {
+        let mut bindings = Bindings::default();
+        pass.bind(&mut bindings);
+        if index + 3 > groups.len() {
+            let message = format!("{}: indirect group count {index} of {}", P::PROGRAM.name, groups.len());
+            return self.fail(GpuError::Shader(message));
+        }
+        let access = Access { id: groups.id(), reads: true, writes: false };
+        let raw = groups.raw();
+        self.run(P::PROGRAM, &bindings, &[access], None, 0, Some(true), |recorder, bound| {
+            let device = &recorder.context.device;
+            // SAFETY: the three counts lie inside the buffer, which allows indirect use.
+            unsafe { device.raw.cmd_dispatch_indirect(recorder.commands(), raw, 4 * index as u64) };
+            let _ = bound;
+        });
+    }
+
+    /// Draws `vertices` x `instances` into `target`; vertex shaders pull their data from buffers.
+    pub fn draw<P: Pass>(&mut self, pass: &P, target: &Target<'_>, state: RasterState, vertices: u32, instances: u32) {
+        let mut bindings = Bindings::default();
+        pass.bind(&mut bindings);
+        let mut attachments: Vec<Access> =
+            target.color.iter().map(|(image, _)| Access { id: image.id(), reads: true, writes: true }).collect();
+        attachments.extend(target.depth.iter().map(|(image, ..)| Access { id: image.id(), reads: true, writes: true }));
+        let Some((width, height)) = target.extent() else {
+            return self.fail(GpuError::Shader(format!("{}: nothing to draw into", P::PROGRAM.name)));
+        };
+        let color: Vec<_> = target.color.iter().map(|(image, _)| image.format).collect();
+        let depth = target.depth.map(|(image, ..)| image.format);
+        let bound = match self.context.pipelines.raster(P::PROGRAM, &bindings.constants, state, &color, depth) {
+            Ok(bound) => bound,
+            Err(error) => return self.fail(error),
+        };
+        let cost = Some(Cost {
+            bytes_read: bytes(P::PROGRAM, &bindings, true),
+            bytes_written: bytes(P::PROGRAM, &bindings, false) + target.size_bytes(),
+        });
+        let count = u64::from(vertices) * u64::from(instances);
+        self.record(P::PROGRAM, &bindings, &attachments, cost, count, bound, Some(false), |recorder| {
+            let device = &recorder.context.device;
+            let commands = recorder.commands();
+            let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
+            let viewport = vk::Viewport {
+                x: 0.0,
+                y: 0.0,
+                width: width as f32,
+                height: height as f32,
+                min_depth: 0.0,
+                max_depth: 1.0,
+            };
+            let color: Vec<_> =
+                target.color.iter().map(|(image, load)| attachment(image.layer_view(0), *load, false)).collect();
+            let depth = target.depth.map(|(image, layer, load)| attachment(image.layer_view(layer), load, true));
+            let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
+            if let Some(depth) = &depth {
+                info = info.depth_attachment(depth);
+            }
+            // SAFETY: attachments are alive and in GENERAL; the pipeline was made for their formats.
+            unsafe {
+                device.cmd_begin_rendering(commands, &info);
+                device.raw.cmd_set_viewport(commands, 0, &[viewport]);
+                device.raw.cmd_set_scissor(commands, 0, &[area]);
+                if vertices > 0 && instances > 0 {
+                    device.raw.cmd_draw(commands, vertices, instances, 0, 0);
+                }
+                device.cmd_end_rendering(commands);
+            }
+        });
+    }
+
+    fn groups(&self, program: &'static Program, threads: Threads) -> Result<Option<([u32; 3], u64)>, GpuError> {
+        let size = program.workgroup;
+        let limit = self.context.device.limits.workgroup_count;
+        let (groups, count) = match threads {
+            Threads::Linear(count) => {
+                let groups = count.div_ceil(size[0]);
+                // Fold a long list into rows of at most `limit` workgroups.
+                let rows = groups.div_ceil(limit).max(1);
+                ([groups.div_ceil(rows), rows, 1], u64::from(count))
+            }
+            Threads::Grid(x, y, z) => (
+                [x.div_ceil(size[0]), y.div_ceil(size[1]), z.div_ceil(size[2])],
+                u64::from(x) * u64::from(y) * u64::from(z),
+            ),
+        };
+        if groups.iter().any(|&g| g > limit) {
+            return Err(GpuError::Shader(format!(
+                "{}: {groups:?} workgroups, this device allows {limit}",
+                program.name
+            )));
+        }
+        Ok((count > 0).then_some((groups, count)))
+    }
+
+    fn compute(
+        &mut self,
+        program: &'static Program,
+        bindings: &Bindings<'_>,
+        cost: Option<Cost>,
+        count: u64,
+        run: impl FnOnce(&super::device::Device, vk::CommandBuffer),
+    ) {
+        self.run(program, bindings, &[], cost, count, Some(true), |recorder, _| {
+            run(&recorder.context.device, recorder.commands())
+        });
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the one place that every compute pass goes through")]
+    fn run(
+        &mut self,
+        program: &'static Program,
+        bindings: &Bindings<'_>,
+        extra: &[Access],
+        cost: Option<Cost>,
+        count: u64,
+        is_compute: Option<bool>,
+        body: impl FnOnce(&Self, Bound),
+    ) {
+        match self.context.pipelines.compute(program, &bindings.constants) {
+            Ok(bound) => {
+                self.record(program, bindings, extra, cost, count, bound, is_compute, |recorder| body(recorder, bound))
+            }
+            Err(error) => self.fail(error),
+        }
+    }
+
+    /// The one place: barrier, label, timestamps, statistics, bindings, push constants, and then the command itself.
+    #[expect(clippy::too_many_arguments, reason = "the one place that every pass goes through")]
+    fn record(
+        &mut self,
+        program: &'static Program,
+        bindings: &Bindings<'_>,
+        extra: &[Access],
+        cost: Option<Cost>,
+        count: u64,
+        bound: Bound,
+        is_compute: Option<bool>,
+        body: impl FnOnce(&Self),
+    ) {
+        if self.error.is_some() {
+            return;
+        }
+        let mut accesses: Vec<Access> = program
+            .bindings
+            .iter()
+            .zip(&bindings.resources)
+            .map(|(info, resource)| Access { id: resource.id, reads: info.reads, writes: info.writes })
+            .collect();
+        accesses.extend_from_slice(extra);
+        let cost = cost.unwrap_or_else(|| Cost {
+            bytes_read: bytes(program, bindings, true),
+            bytes_written: bytes(program, bindings, false),
+        });
+        let device = self.context.device.clone();
+        let commands = self.commands();
+        self.timed(program.name, &accesses, cost, count, is_compute, |recorder| {
+            let point =
+                if program.is_compute() { vk::PipelineBindPoint::COMPUTE } else { vk::PipelineBindPoint::GRAPHICS };
+            // SAFETY: the layout was made for this program; resources are alive until the submission ends (their
+            // owners borrow or bury them).
+            unsafe {
+                device.raw.cmd_bind_pipeline(commands, point, bound.pipeline);
+                push_descriptors(&device, commands, point, bound.layout, program, bindings);
+                if let (true, Some(table)) = (program.uses_textures, bindings.textures) {
+                    device.raw.cmd_bind_descriptor_sets(commands, point, bound.layout, 1, &[table.set()], &[]);
+                }
+                if program.push_constant_bytes > 0 {
+                    device.raw.cmd_push_constants(
+                        commands,
+                        bound.layout,
+                        stage_flags(program),
+                        0,
+                        bindings.push_constants,
+                    );
+                }
+            }
+            body(recorder);
+        });
+    }
+
+    /// Wraps one command in hazard check, label and queries.
+    pub(super) fn timed(
+        &mut self,
+        name: &'static str,
+        accesses: &[Access],
+        cost: Cost,
+        threads: u64,
+        is_compute: Option<bool>,
+        body: impl FnOnce(&mut Self),
+    ) {
+        if self.error.is_some() {
+            return;
+        }
+        let needs_barrier = self.hazards.needs_barrier(accesses);
+        if (needs_barrier && !self.context.options.skip_barriers) || self.context.options.full_barriers {
+            self.barrier();
+            self.hazards.clear();
+            let _ = self.hazards.needs_barrier(accesses);
+        }
+        let index = self.timed.len() as u32;
+        let (pool, query) = ((index / PASSES_PER_POOL) as usize, index % PASSES_PER_POOL);
+        let slot = match self.slot.as_mut().map(|slot| self.context.grow_slot(slot, pool).map(|()| slot)) {
+            Some(Ok(slot)) => slot,
+            Some(Err(error)) => return self.fail(error),
+            None => return,
+        };
+        let (timestamps, statistics) = (slot.timestamps[pool], slot.statistics.get(pool).copied());
+        let statistics = statistics.filter(|_| is_compute.is_some());
+        let commands = slot.commands;
+        let device = self.context.device.clone();
+        device.begin_label(commands, name);
+        // SAFETY: the queries were reset on the host when the slot was taken; begin and end pair up.
+        unsafe {
+            device.raw.cmd_write_timestamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, timestamps, 2 * query);
+            if let Some(statistics) = statistics {
+                device.raw.cmd_begin_query(commands, statistics, query, vk::QueryControlFlags::empty());
+            }
+            body(self);
+            if let Some(statistics) = statistics {
+                device.raw.cmd_end_query(commands, statistics, query);
+            }
+            device.raw.cmd_write_timestamp(commands, vk::PipelineStageFlags::BOTTOM_OF_PIPE, timestamps, 2 * query + 1);
+        }
+        device.end_label(commands);
+        let overlapped = !(needs_barrier || self.context.options.full_barriers || self.timed.is_empty());
+        let path = format!("{}/{name}", self.scopes.join("/"));
+        self.timed.push(Timed { path, name, cost, threads, overlapped, is_compute });
+    }
+
+    /// Makes all that was written before visible to all that comes after.
+    fn barrier(&self) {
+        let all = vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .dst_access_mask(vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE);
+        let barriers = [all];
+        // SAFETY: the command buffer is recording.
+        unsafe {
+            self.context
+                .device
+                .cmd_pipeline_barrier2(self.commands(), &vk::DependencyInfo::default().memory_barriers(&barriers));
+        }
+    }
+
+    /// Keeps a staging buffer alive until the submission ends.
+    pub(super) fn keep(&mut self, staging: RawBuffer) {
+        self.staging.push(staging);
+    }
+
+    pub(super) fn fail(&mut self, error: GpuError) {
+        self.error.get_or_insert(error);
+    }
+
+    pub(super) fn context(&self) -> &'c Context {
+        self.context
+    }
+
+    pub(super) fn raw_commands(&self) -> vk::CommandBuffer {
+        self.commands()
+    }
+
+    /// Submits, waits until the device is done, and hands the pass records to the context.
+    pub fn submit(mut self) -> Result<(), GpuError> {
+        self.finish().map(drop)
+    }
+
+    /// As [`Self::submit`], handing back the staging buffers (read-backs) in the order they were kept.
+    pub(super) fn finish(&mut self) -> Result<Vec<RawBuffer>, GpuError> {
+        if let Some(error) = self.error.take() {
+            return Err(error);
+        }
+        let device = self.context.device.clone();
+        let commands = self.commands();
+        // Host reads of staging memory need an explicit dependency.
+        let to_host = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+        let last_pass = self.timed.last().map_or_else(|| self.scopes.join("/"), |t| t.path.clone());
+        // SAFETY: the command buffer is complete; queue access is exclusive by the lock.
+        unsafe {
+            device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&to_host));
+            device.end_label(commands);
+            device.raw.end_command_buffer(commands).checked("vkEndCommandBuffer", &last_pass)?;
+            let value = {
+                let _queue = lock(&self.context.queue_lock);
+                let value = device.submitted.load(Ordering::Acquire) + 1;
+                let values = [value];
+                let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
+                let (buffers, semaphores) = ([commands], [device.timeline]);
+                let submit = vk::SubmitInfo::default()
+                    .command_buffers(&buffers)
+                    .signal_semaphores(&semaphores)
+                    .push_next(&mut timeline);
+                device
+                    .raw
+                    .queue_submit(device.queue, &[submit], vk::Fence::null())
+                    .checked("vkQueueSubmit", &last_pass)
+                    .map_err(|e| self.context.with_fault(e))?;
+                device.submitted.store(value, Ordering::Release);
+                value
+            };
+            self.context.wait(value, &last_pass)?;
+        }
+        self.collect(&last_pass)?;
+        Ok(std::mem::take(&mut self.staging))
+    }
+
+    /// Reads the queries and appends one record per pass.
+    fn collect(&mut self, last_pass: &str) -> Result<(), GpuError> {
+        let device = &self.context.device;
+        let Some(slot) = &self.slot else { return Ok(()) };
+        let period = device.limits.timestamp_period_ns;
+        let mut records = Vec::with_capacity(self.timed.len());
+        for (pool, chunk) in self.timed.chunks(PASSES_PER_POOL as usize).enumerate() {
+            let mut ticks = vec![0u64; 2 * chunk.len()];
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            // SAFETY: the submission is complete and wrote each of these queries.
+            unsafe { device.raw.get_query_pool_results(slot.timestamps[pool], 0, &mut ticks, flags) }
+                .checked("vkGetQueryPoolResults", last_pass)?;
+            for (i, timed) in chunk.iter().enumerate() {
+                let mut counters = vec![("threads", timed.threads)];
+                if let (Some(&statistics), Some(is_compute)) = (slot.statistics.get(pool), timed.is_compute) {
+                    let mut counts = [[0u64; STATISTICS.len()]];
+                    // SAFETY: as above; one result of three values.
+                    unsafe { device.raw.get_query_pool_results(statistics, i as u32, &mut counts, flags) }
+                        .checked("vkGetQueryPoolResults", last_pass)?;
+                    let named = STATISTICS.iter().zip(counts[0]);
+                    counters.extend(
+                        named
+                            .filter(|((_, compute), _)| *compute == is_compute)
+                            .map(|((name, _), count)| (*name, count)),
+                    );
+                }
+                let to_ns = |ticks: u64| (ticks as f64 * period) as u64;
+                records.push(PassRecord {
+                    path: timed.path.clone(),
+                    name: timed.name,
+                    start_ns: to_ns(ticks[2 * i]),
+                    end_ns: to_ns(ticks[2 * i + 1]),
+                    bytes_read: timed.cost.bytes_read,
+                    bytes_written: timed.cost.bytes_written,
+                    counters,
+                    overlapped: timed.overlapped,
+                });
+            }
+        }
+        self.context.append_records(records);
+        Ok(())
+    }
+}
+
+/// Counter names in the order of the flag bits in [`super::context::STATISTIC_FLAGS`], and whether compute fills them.
+const STATISTICS: [(&str, bool); 3] =
+    [("clipping_primitives", false), ("fragment_invocations", false), ("compute_invocations", true)];
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        if let Some(slot) = self.slot.take() {
+            self.context.give_slot(slot);
+        }
+        self.staging.clear();
+        self.context.device.open_recorders.fetch_sub(1, Ordering::AcqRel);
+        self.context.device.sweep();
+    }
+}
+
+impl Target<'_> {
+    fn extent(&self) -> Option<(u32, u32)> {
+        let first = self.color.first().map(|(image, _)| *image).or(self.depth.map(|(image, ..)| image))?;
+        Some((first.width, first.height))
+    }
+
+    fn size_bytes(&self) -> u64 {
+        let color: u64 = self.color.iter().map(|(image, _)| image.size_bytes()).sum();
+        color + self.depth.map_or(0, |(image, ..)| image.size_bytes() / u64::from(image.layers))
+    }
+}
+
+fn attachment(view: vk::ImageView, load: Load, depth: bool) -> vk::RenderingAttachmentInfo<'static> {
+    let (op, value) = match load {
+        Load::Keep => (vk::AttachmentLoadOp::LOAD, [0.0; 4]),
+        Load::Clear(value) => (vk::AttachmentLoadOp::CLEAR, value),
+    };
+    let clear = if depth {
+        vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: value[0], stencil: 0 } }
+    } else {
+        vk::ClearValue { color: vk::ClearColorValue { float32: value } }
+    };
+    vk::RenderingAttachmentInfo::default()
+        .image_view(view)
+        .image_layout(vk::ImageLayout::GENERAL)
+        .load_op(op)
+        .store_op(vk::AttachmentStoreOp::STORE)
+        .clear_value(clear)
+}
+
+/// Bytes of everything a pass reads (or writes), each bound object once.
+fn bytes(program: &Program, bindings: &Bindings<'_>, read: bool) -> u64 {
+    let used = program
+        .bindings
+        .iter()
+        .zip(&bindings.resources)
+        .filter(|(info, _)| if read { info.reads } else { info.writes });
+    used.map(|(_, resource)| resource.bytes).sum()
+}
+
+unsafe fn push_descriptors(
+    device: &super::device::Device,
+    commands: vk::CommandBuffer,
+    point: vk::PipelineBindPoint,
+    layout: vk::PipelineLayout,
+    program: &Program,
+    bindings: &Bindings<'_>,
+) {
+    let structures: Vec<[vk::AccelerationStructureKHR; 1]> = bindings
+        .resources
+        .iter()
+        .map(|r| match r.handle {
+            Handle::AccelerationStructure(raw) => [raw],
+            _ => [vk::AccelerationStructureKHR::null()],
+        })
+        .collect();
+    let mut structure_writes: Vec<_> = structures
+        .iter()
+        .map(|s| vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(s))
+        .collect();
+    let mut writes = Vec::with_capacity(bindings.resources.len());
+    for ((info, resource), structure) in program.bindings.iter().zip(&bindings.resources).zip(&mut structure_writes) {
+        let write =
+            vk::WriteDescriptorSet::default().dst_binding(info.binding).descriptor_type(descriptor_type(info.kind));
+        writes.push(match &resource.handle {
+            Handle::Buffer(buffer) => write.buffer_info(std::slice::from_ref(buffer)),
+            Handle::Image(image) => write.image_info(std::slice::from_ref(image)),
+            Handle::AccelerationStructure(_) => {
+                let mut write = write.push_next(structure);
+                write.descriptor_count = 1;
+                write
+            }
+        });
+    }
+    if !writes.is_empty() {
+        // SAFETY: every write refers to live objects of the kinds the layout declares.
+        unsafe { device.push_descriptor.cmd_push_descriptor_set(commands, point, layout, 0, &writes) };
+    }
+}

@@ -1,0 +1,3 @@
+//! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
+
+pub mod scan;
