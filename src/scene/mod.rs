@@ -14,8 +14,11 @@ pub mod camera;
 pub mod deform;
 pub mod environment;
 pub mod geometry;
+pub mod gltf;
 pub mod pose;
 pub mod shapes;
+
+pub use gltf::{LoadOptions, SceneChoice, SceneError, load, load_bytes, load_bytes_with};
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 
@@ -78,7 +81,8 @@ pub struct Primitive {
     pub positions: Vec<Vec3>,
     /// Unit length; computed (flat or smooth as glTF asks) where the file has none.
     pub normals: Vec<Vec3>,
-    /// xyz unit tangent, w = +1 or -1 handedness; present when the material has a normal map.
+    /// xyz unit tangent, w = +1 or -1 handedness; present when the material has a normal map and the
+    /// primitive the texture coordinates it needs.
     pub tangents: Vec<Vec4>,
     pub uv: [Vec<Vec2>; 2],
     /// Linear RGBA vertex colour.
@@ -129,6 +133,32 @@ pub struct Material {
     pub specular_color: Vec3,
 }
 
+/// glTF's defaults: white, fully metallic and rough, opaque, one-sided.
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: Vec4::ONE,
+            base_color_texture: None,
+            metallic: 1.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            occlusion_texture: None,
+            occlusion_strength: 1.0,
+            emission: Vec3::ZERO,
+            emission_texture: None,
+            alpha_cutoff: None,
+            double_sided: false,
+            unlit: false,
+            ior: 1.5,
+            specular: 1.0,
+            specular_color: Vec3::ONE,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextureRef {
     pub texture: u32,
@@ -157,7 +187,10 @@ pub enum Wrap {
     ClampToEdge,
 }
 
-/// Eight-bit RGBA, row 0 at the top, at most `MAX_IMAGE_EXTENT` a side.
+/// Most pixels on a side of an [`Image`]: what desktop GPUs and lavapipe can sample.
+pub const MAX_IMAGE_EXTENT: u32 = 16384;
+
+/// Eight-bit RGBA, row 0 at the top, at most [`MAX_IMAGE_EXTENT`] a side.
 #[derive(Debug, Clone, Default)]
 pub struct Image {
     pub name: String,

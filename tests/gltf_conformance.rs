@@ -1,0 +1,152 @@
+//! Valid scenes load, and hold what their makers say they hold.
+//!
+//! Runs over the shared scene collection, where there is one beside the checkout (or at `LINKLIGHT_SHARED`).
+
+use linklight::scene::{self, LoadOptions, Scene};
+use std::path::{Path, PathBuf};
+
+/// The shared test inputs; `None` (said on standard error) where there are none.
+fn shared(folder: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("LINKLIGHT_SHARED")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let path = root.join(folder);
+    if !path.is_dir() {
+        eprintln!("skipped: {} does not exist (set LINKLIGHT_SHARED)", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+fn load(path: &Path) -> Scene {
+    scene::load(path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn gltf_files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            gltf_files(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb") {
+            found.push(path);
+        }
+    }
+}
+
+/// Triangles stored, triangles drawn (each mesh as often as nodes show it), and those dropped, from the notes.
+fn triangle_counts(scene: &Scene) -> (usize, usize, usize) {
+    let of_mesh = |mesh: &scene::Mesh| mesh.primitives.iter().map(|p| p.triangles.len()).sum::<usize>();
+    let stored = scene.meshes.iter().map(of_mesh).sum();
+    let drawn = scene.nodes.iter().filter_map(|node| node.mesh).map(|mesh| of_mesh(&scene.meshes[mesh as usize])).sum();
+    let dropped = scene.notes.iter().find_map(|note| note.strip_suffix(" degenerate triangles were dropped."));
+    (stored, drawn, dropped.map_or(0, |count| count.parse().unwrap()))
+}
+
+#[test]
+fn every_shared_scene_loads_soundly() {
+    let Some(folder) = shared("scenes") else { return };
+    let mut files = Vec::new();
+    gltf_files(&folder, &mut files);
+    assert!(files.len() > 90, "{} files", files.len());
+    for file in files {
+        let name = file.strip_prefix(&folder).unwrap().to_string_lossy().into_owned();
+        match scene::load(&file, &LoadOptions::default()) {
+            Ok(scene) => assert_sound(&scene, &name),
+            // These two are made to be refused: a required minor version and a required unknown extension.
+            Err(error) if name.ends_with("Compatibility_04.gltf") => assert!(error.to_string().contains("\"2.1\"")),
+            Err(error) if name.ends_with("Compatibility_05.gltf") => {
+                assert!(error.to_string().contains("FAKE_materials_quantumRendering"), "{error}");
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+#[test]
+fn triangle_counts_match_the_manifest() {
+    let Some(folder) = shared("scenes") else { return };
+    let manifest = std::fs::read_to_string(folder.join("MANIFEST.md")).unwrap();
+    let mut checked = 0;
+    for row in manifest.lines().filter(|row| row.starts_with("| `")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let (name, triangles) = (cells[1].trim_matches('`'), cells[3]);
+        let Some(stated) = triangles.split(' ').next().and_then(|count| count.parse::<usize>().ok()) else { continue };
+        let drawn_stated = triangles.split(['(', ')']).nth(1).map(|count| count.parse::<usize>().unwrap());
+        // The manifest counts all scenes of the file, of which one is loaded.
+        if name.contains("MultipleScenes") {
+            continue;
+        }
+        let scene = load(&folder.join(name));
+        let (stored, drawn, dropped) = triangle_counts(&scene);
+        assert!(stored + dropped == stated || drawn + dropped == stated, "{name}: {stored} + {dropped}, not {stated}");
+        if let Some(drawn_stated) = drawn_stated {
+            assert_eq!(drawn, drawn_stated, "{name}");
+        }
+        checked += 1;
+    }
+    assert!(checked > 35, "{checked} rows");
+}
+
+/// What [`Scene`] promises: indices in range, parents first, array lengths equal, unit vectors, finite numbers.
+fn assert_sound(scene: &Scene, name: &str) {
+    assert!(!scene.materials.is_empty(), "{name}");
+    for (index, node) in scene.nodes.iter().enumerate() {
+        assert!(node.parent.is_none_or(|parent| (parent as usize) < index), "{name}: node {index}");
+        let in_range = |index: Option<u32>, count: usize| index.is_none_or(|index| (index as usize) < count);
+        assert!(in_range(node.mesh, scene.meshes.len()) && in_range(node.skin, scene.skins.len()), "{name}");
+        assert!(in_range(node.camera, scene.cameras.len()) && in_range(node.light, scene.lights.len()), "{name}");
+        match node.transform {
+            scene::Transform::Matrix(matrix) => assert!(matrix.is_finite(), "{name}"),
+            scene::Transform::Trs { translation, rotation, scale } => {
+                assert!(translation.is_finite() && rotation.is_normalized() && scale.is_finite(), "{name}");
+            }
+        }
+    }
+    for primitive in scene.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        assert_sound_primitive(scene, primitive, name);
+    }
+    for texture in &scene.textures {
+        assert!((texture.image as usize) < scene.images.len(), "{name}");
+    }
+    for image in &scene.images {
+        assert_eq!(image.rgba.len() as u64, u64::from(image.width) * u64::from(image.height) * 4, "{name}");
+    }
+    for skin in &scene.skins {
+        assert_eq!(skin.joints.len(), skin.inverse_bind.len(), "{name}");
+        assert!(skin.joints.iter().all(|joint| (*joint as usize) < scene.nodes.len()), "{name}");
+    }
+    for channel in scene.clips.iter().flat_map(|clip| &clip.channels) {
+        assert!((channel.node as usize) < scene.nodes.len(), "{name}");
+        assert!(channel.times.windows(2).all(|pair| pair[0] < pair[1]), "{name}");
+        let per_key = if channel.interpolation == scene::Interpolation::CubicSpline { 3 } else { 1 };
+        let values = match &channel.track {
+            scene::Track::Translation(values) | scene::Track::Scale(values) => values.len(),
+            scene::Track::Rotation(values) => values.len(),
+            scene::Track::MorphWeights { target_count, weights } => weights.len() / target_count,
+        };
+        assert_eq!(values, channel.times.len() * per_key, "{name}");
+    }
+}
+
+fn assert_sound_primitive(scene: &Scene, primitive: &scene::Primitive, name: &str) {
+    let count = primitive.positions.len();
+    let fits = |len: usize| len == 0 || len == count;
+    assert!(primitive.positions.iter().all(|position| position.is_finite()), "{name}");
+    assert_eq!(primitive.normals.len(), count, "{name}");
+    assert!(primitive.normals.iter().all(|normal| normal.is_normalized()), "{name}");
+    assert!(fits(primitive.tangents.len()) && fits(primitive.colors.len()), "{name}");
+    assert!(primitive.tangents.iter().all(|t| t.truncate().is_normalized() && t.w.abs() == 1.0), "{name}");
+    assert!(primitive.uv.iter().all(|uv| fits(uv.len())), "{name}");
+    assert!(fits(primitive.joints.len()) && primitive.joints.len() == primitive.joint_weights.len(), "{name}");
+    for weights in &primitive.joint_weights {
+        assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{name}: {weights:?}");
+    }
+    for target in &primitive.morph_targets {
+        assert!(fits(target.positions.len()) && fits(target.normals.len()) && fits(target.tangents.len()), "{name}");
+    }
+    let mut is_used = vec![false; count];
+    for triangle in &primitive.triangles {
+        triangle.iter().for_each(|vertex| is_used[*vertex as usize] = true);
+    }
+    assert!(is_used.iter().all(|used| *used), "{name}: a vertex that no triangle uses");
+    assert!((primitive.material as usize) < scene.materials.len(), "{name}");
+}
