@@ -9,7 +9,7 @@ use super::hazards::Access;
 use super::profiler::Cost;
 use super::recorder::Recorder;
 use ash::vk;
-use glam::Vec3;
+use glam::{UVec3, Vec3};
 use gpu_allocator::MemoryLocation;
 use std::sync::Arc;
 
@@ -91,7 +91,7 @@ impl Context {
         &self,
         name: &str,
         positions: &Buffer<Vec3>,
-        indices: &Buffer<[u32; 3]>,
+        indices: &Buffer<UVec3>,
     ) -> Result<Option<AccelerationStructure>, GpuError> {
         let device = &self.device;
         let Some(extension) = &device.acceleration_structure else { return Ok(None) };
@@ -170,7 +170,7 @@ impl Recorder<'_> {
         &mut self,
         structure: &AccelerationStructure,
         positions: &Buffer<Vec3>,
-        indices: &Buffer<[u32; 3]>,
+        indices: &Buffer<UVec3>,
     ) {
         let device = self.context().device.clone();
         let Some(extension) = &device.acceleration_structure else { return };

@@ -1,3 +1,4 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
 pub mod scan;
+pub mod world;

@@ -1,0 +1,70 @@
+#version 460
+#extension GL_EXT_nonuniform_qualifier : require
+#include "lib/prelude.glsl"
+#include "lib/material.glsl"
+
+// One thread per element: albedo and emission averaged over the triangles around its vertex, each sampled at the
+// centre of the third of its area that belongs to the vertex, at the mip level of that size.
+// reads triangles, incident_offsets[element_count + 1], incident_triangles, positions, attributes, materials
+// writes albedo[element_count] (1), emission[element_count] (W m^-2 sr^-1), area[element_count] (m2)   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer TriangleMaterials { uint triangle_materials[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer IncidentOffsets { uint incident_offsets[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer IncidentTriangles { uint incident_triangles[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Emission { vec3 emission[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Area { float area[]; };
+layout(set = 1, binding = 0) uniform sampler2D textures[];
+layout(push_constant, scalar) uniform Params { uint element_count; } params;
+
+// Size of the sampled region in each UV set, as a fraction of the texture's width.
+vec2 region_uv;
+
+vec4 sample_texture(uint index, vec2 uv)
+{
+    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(index)], 0).x);
+    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+}
+
+float uv_extent(vec2 a, vec2 b, vec2 c)
+{
+    vec2 ab = b - a, ac = c - a;
+    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / 6.0);
+}
+
+void main()
+{
+    uint element = linear_index();
+    if (element >= params.element_count) return;
+
+    vec3 albedo_sum = vec3(0.0), emission_sum = vec3(0.0);
+    float area_sum = 0.0;
+    for (uint k = incident_offsets[element]; k < incident_offsets[element + 1]; ++k) {
+        uint triangle = incident_triangles[k];
+        uvec3 v = triangles[triangle];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        float third = length(cross(b - a, c - a)) / 6.0;
+
+        // The vertex's third of a triangle has its centre at weights (22, 7, 7) / 36.
+        vec3 w = (vec3(equal(v, uvec3(element))) * 15.0 + 7.0) / 36.0;
+        VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
+        VertexAttributes at;
+        at.uv0 = w.x * p.uv0 + w.y * q.uv0 + w.z * r.uv0;
+        at.uv1 = w.x * p.uv1 + w.y * q.uv1 + w.z * r.uv1;
+        at.color = w.x * p.color + w.y * q.color + w.z * r.color;
+        region_uv = vec2(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
+
+        Material m = materials[triangle_materials[triangle]];
+        albedo_sum += third * albedo_of(m, at);
+        emission_sum += third * emission_of(m, at);
+        area_sum += third;
+    }
+    float inverse = area_sum > 0.0 ? 1.0 / area_sum : 0.0;
+    albedo[element] = albedo_sum * inverse;
+    emission[element] = emission_sum * inverse;
+    area[element] = area_sum;
+}
