@@ -1,4 +1,7 @@
 //! **linklight**: a Vulkan-native global-illumination renderer.
+pub mod app;
 pub mod gpu;
+pub mod methods;
+pub mod report;
 pub mod scene;
 pub mod stages;

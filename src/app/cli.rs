@@ -1,0 +1,224 @@
+//! The command line, declared for clap. Values are checked here as far as one value alone can be; [`super::render`]
+//! checks them against each other.
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+
+use super::console::Verbosity;
+use super::diff::Limit;
+use super::values::{
+    CameraChoice, Environment, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_method, parse_size,
+};
+use crate::methods::Method;
+use crate::methods::settings::Assignment;
+use crate::report::tonemap::Operator;
+
+/// Renders glTF scenes by published finite-element global-illumination methods beside a path-traced reference
+#[derive(Debug, Parser)]
+#[command(name = "linklight", version, max_term_width = 110, after_help = EXIT_CODES)]
+pub struct Cli {
+    #[command(flatten)]
+    pub global: Global,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 the work failed, 2 wrong usage, 3 no usable GPU.";
+
+/// Options of every command.
+#[derive(Debug, Clone, Args)]
+pub struct Global {
+    /// GPU to use: part of its name, or its index in `linklight devices`
+    #[arg(long, global = true, value_name = "NAME|INDEX")]
+    pub gpu: Option<String>,
+    /// Run with the Vulkan validation layers; any error they report fails the command
+    #[arg(long, global = true)]
+    pub validate: bool,
+    /// Say nothing but errors
+    #[arg(long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Say more; twice for everything
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub verbose: u8,
+}
+
+impl Global {
+    pub fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (false, 0) => Verbosity::Normal,
+            (false, 1) => Verbosity::Detailed,
+            (false, _) => Verbosity::All,
+        }
+    }
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene into a picture
+    Render(Box<RenderArgs>),
+    /// Print how far picture A is from reference B
+    Diff(DiffArgs),
+    /// List the methods and their settings
+    Methods(MethodsArgs),
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArgs {
+    /// A .gltf or .glb file, or builtin:NAME
+    #[arg(value_name = "SCENE")]
+    pub scene: SceneSource,
+    /// Picture to write: .exr holds linear radiance, .png what a display shows
+    #[arg(short, long, value_name = "FILE.exr|FILE.png")]
+    pub output: Output,
+    /// Method, see `linklight methods`
+    #[arg(long, value_name = "KEY", value_parser = parse_method, default_value = "explicit-visibility")]
+    pub method: &'static Method,
+    /// How the solution becomes pixels [default: vertex; path-tracing has none]
+    #[arg(long, value_enum)]
+    pub display: Option<Display>,
+    /// Indirect bounces after the direct light
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub bounces: u32,
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = parse_size)]
+    pub size: (u32, u32),
+    /// Samples per pixel of path-tracing [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
+    pub spp: Option<u32>,
+    /// Animation time in seconds
+    #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = parse_animation_seconds, allow_negative_numbers = true)]
+    pub seconds: f32,
+    /// Frames to compute; the last one is written
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Camera of the scene, by name or index [default: the first, else one framed on the bounds]
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub camera: Option<CameraChoice>,
+    /// Environment: an equirectangular .hdr/.exr picture, or one radiance for all directions [default: none]
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
+    pub env: Option<Environment>,
+    /// Leave out specular reflection: every surface is Lambertian with its base colour
+    #[arg(long)]
+    pub diffuse: bool,
+    /// Only light that comes straight from lights, emitters and the environment
+    #[arg(long, conflicts_with = "indirect_only")]
+    pub direct_only: bool,
+    /// Only light that was reflected at least once before
+    #[arg(long)]
+    pub indirect_only: bool,
+    /// Tessellate to about this many elements [default: as the scene is]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
+    pub elements: Option<u32>,
+    /// Exposure in stops, for .png
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = parse_exposure, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Tone mapping, for .png
+    #[arg(long, value_enum, default_value_t)]
+    pub tonemap: Operator,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u32,
+    /// A setting of the method, see `linklight methods`; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// Extra channels of an .exr, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
+    pub channels: Vec<Channel>,
+    /// Write times, bytes and counters of every pass as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub profile: Option<PathBuf>,
+    /// Write a time line of CPU and GPU for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE.trace.json")]
+    pub trace: Option<PathBuf>,
+    /// Write a RenderDoc capture of the last frame
+    #[arg(long, value_name = "FILE.rdc")]
+    pub capture: Option<PathBuf>,
+}
+
+/// Display stages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Display {
+    /// Interpolate the solution between vertices
+    #[default]
+    Vertex,
+}
+
+/// Named channels of an EXR beside RGB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ValueEnum)]
+pub enum Channel {
+    /// direct.R, .G, .B: radiance from direct light
+    Direct,
+    /// indirect.R, .G, .B: radiance from reflected light
+    Indirect,
+    /// albedo.R, .G, .B: diffuse reflectance
+    Albedo,
+    /// normal.X, .Y, .Z: unit normal in world space
+    Normal,
+    /// depth.Z: distance from the camera along its axis, metres
+    Depth,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// The picture in question: PNG, EXR or HDR
+    #[arg(value_name = "A")]
+    pub picture: PathBuf,
+    /// The reference it is held to, of the same kind and size
+    #[arg(value_name = "B")]
+    pub reference: PathBuf,
+    /// Compare only where this picture is not black
+    #[arg(long, value_name = "FILE")]
+    pub mask: Option<PathBuf>,
+    /// Compare this layer of two .exr files (direct, indirect, albedo, normal) in place of their RGB
+    #[arg(long, value_name = "NAME")]
+    pub layer: Option<String>,
+    /// Write a heat map of the error
+    #[arg(short, long, value_name = "FILE.png")]
+    pub output: Option<PathBuf>,
+    /// What the heat map shows
+    #[arg(long, value_enum, default_value_t, requires = "output")]
+    pub map: HeatMap,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Fail (exit code 1) if a figure is above this limit: rmse, relmse, energy (|ratio - 1|), p95, ssim (1 - SSIM),
+    /// flip, flip-p95; may be repeated
+    #[arg(long, value_name = "FIGURE=LIMIT")]
+    pub fail_above: Vec<Limit>,
+    /// Exposure in stops at which FLIP sees radiance
+    #[arg(long, value_name = "EV", default_value_t = 0.0, value_parser = parse_exposure, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Tone mapping through which FLIP sees radiance, fitted to B
+    #[arg(long, value_enum, default_value_t)]
+    pub tonemap: Operator,
+}
+
+/// Error maps of `diff`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum HeatMap {
+    /// FLIP: what an observer notices
+    #[default]
+    Flip,
+    /// Relative error of radiance, white at 100 %
+    Relative,
+}
+
+#[derive(Debug, Args)]
+pub struct MethodsArgs {
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_declaration_is_sound() {
+        use clap::CommandFactory as _;
+        Cli::command().debug_assert();
+    }
+}

@@ -1,0 +1,72 @@
+//! How a command ends when it does not end well: the message and the exit code.
+
+use std::error::Error;
+use std::io;
+
+use super::interrupt::Interrupted;
+use crate::methods::settings::SettingError;
+use crate::report::errors::CompareError;
+use crate::report::image::PictureError;
+use crate::report::profile::ProfileError;
+use crate::report::write::FileError;
+
+/// Why a command failed. Messages say what failed, the value seen, what was allowed and what to do next.
+#[derive(Debug, thiserror::Error)]
+pub enum AppError {
+    /// Wrong usage that clap cannot see; exit code 2.
+    #[error("{0}\n\nFor more information, try '--help'.")]
+    Usage(String),
+    /// The work failed; exit code 1.
+    #[error(transparent)]
+    Failed(Box<dyn Error + Send + Sync>),
+    /// A limit of `diff` was exceeded; exit code 1.
+    #[error("{0}")]
+    AboveLimit(String),
+    /// The user stopped the work; exit code 1.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    /// No usable GPU; exit code 3.
+    #[error("no usable GPU: {0}")]
+    NoGpu(String),
+    /// Standard output could not be written; exit code 1, or 0 where its reader merely went away.
+    #[error("cannot write to standard output: {0}")]
+    Output(#[from] io::Error),
+}
+
+impl AppError {
+    /// Any error of the work itself.
+    pub fn failed(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::Failed(error.into())
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Failed(_) | Self::AboveLimit(_) | Self::Interrupted(_) | Self::Output(_) => 1,
+            Self::Usage(_) => 2,
+            Self::NoGpu(_) => 3,
+        }
+    }
+
+    /// Whether the reader of standard output closed it (`linklight methods | head`).
+    pub fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)
+    }
+}
+
+impl From<SettingError> for AppError {
+    fn from(error: SettingError) -> Self {
+        Self::Usage(error.to_string())
+    }
+}
+
+macro_rules! failed_from {
+    ($($error:ty),*) => {
+        $(impl From<$error> for AppError {
+            fn from(error: $error) -> Self {
+                Self::failed(error)
+            }
+        })*
+    };
+}
+failed_from!(CompareError, FileError, PictureError, ProfileError, serde_json::Error);

@@ -1,0 +1,35 @@
+//! One file per subcommand, and what they share: the command line, errors with exit codes, interruption, progress.
+//!
+//! | module | command |
+//! |---|---|
+//! | [`render`] | `linklight render`: a scene by a method into a picture |
+//! | [`diff`] | `linklight diff`: error figures of two pictures |
+//! | [`methods`] | `linklight methods`: methods and their settings |
+//!
+//! A command writes what it was asked for to `out`; notes, progress and logs go to standard error.
+
+pub mod cli;
+pub mod console;
+pub mod diff;
+mod error;
+pub mod interrupt;
+pub mod methods;
+pub mod render;
+pub mod values;
+
+use std::io::Write;
+
+pub use error::AppError;
+
+/// Run a parsed command line.
+pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
+    let console = console::Console::start(cli.global.verbosity());
+    match cli.command {
+        cli::Command::Render(args) => {
+            let request = render::RenderRequest::try_from(*args)?;
+            render::run(&request, &cli.global, &console, out)
+        }
+        cli::Command::Diff(args) => diff::run(&args, out),
+        cli::Command::Methods(args) => methods::run(&args, out),
+    }
+}

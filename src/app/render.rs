@@ -1,0 +1,265 @@
+//! `linklight render`: the options as one typed, checked request.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+
+use super::AppError;
+use super::cli::{Channel, Display, Global, RenderArgs};
+use super::console::Console;
+use super::values::{CameraChoice, Environment, Format, Output, SceneSource};
+use crate::methods::Method;
+use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
+use crate::report::tonemap::ToneSettings;
+use crate::report::write::check_writable;
+
+const DEFAULT_SPP: u32 = 64;
+
+/// Everything that decides a picture: options checked alone and against each other.
+#[derive(Debug, Clone)]
+pub struct RenderRequest {
+    pub scene: SceneSource,
+    pub output: Output,
+    pub method: &'static Method,
+    /// `None` for path-tracing, which has pixels of its own.
+    pub display: Option<Display>,
+    /// Indirect bounces after the direct light.
+    pub bounces: u32,
+    /// Pixels.
+    pub width: u32,
+    pub height: u32,
+    /// Samples per pixel of path-tracing.
+    pub spp: u32,
+    /// Animation time.
+    pub seconds: f32,
+    /// Frames to compute, at least 1; the last one is written.
+    pub frames: u32,
+    /// `None` takes the first of the scene, else one framed on its bounds.
+    pub camera: Option<CameraChoice>,
+    pub environment: Option<Environment>,
+    /// Specular reflection is left out.
+    pub diffuse: bool,
+    pub light: LightParts,
+    /// Tessellation target; `None` leaves the scene as it is.
+    pub elements: Option<u32>,
+    pub tone: ToneSettings,
+    pub seed: u32,
+    /// Checked: [`RenderRequest::settings`] of the method's own type succeeds.
+    pub assignments: Vec<Assignment>,
+    /// Each at most once, in order of declaration.
+    pub channels: Vec<Channel>,
+    pub profile: Option<PathBuf>,
+    pub trace: Option<PathBuf>,
+    pub capture: Option<PathBuf>,
+}
+
+/// Which light is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightParts {
+    All,
+    DirectOnly,
+    IndirectOnly,
+}
+
+impl TryFrom<RenderArgs> for RenderRequest {
+    type Error = AppError;
+
+    fn try_from(args: RenderArgs) -> Result<Self, AppError> {
+        let usage = |message: String| Err(AppError::Usage(message));
+        let path_traced = args.method.key == "path-tracing";
+        if !path_traced && let Some(spp) = args.spp {
+            return usage(format!("--spp {spp} applies to path-tracing only; the method is {}", args.method.key));
+        }
+        if path_traced && args.display.is_some() {
+            return usage(
+                "--display applies to methods that solve on elements; path-tracing has pixels of its own".into(),
+            );
+        }
+        if args.output.format == Format::Png && !args.channels.is_empty() {
+            let output = args.output.path.display();
+            return usage(format!("--channels needs an .exr; {output} is a .png and has no room for them"));
+        }
+        if args.indirect_only && args.bounces == 0 {
+            return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
+        }
+        args.method.record(&args.set)?;
+
+        let mut written = vec![&args.output.path];
+        written.extend([&args.profile, &args.trace, &args.capture].into_iter().flatten());
+        for (index, path) in written.iter().enumerate() {
+            if written[..index].contains(path) {
+                return usage(format!("two outputs are called {}; give each its own name", path.display()));
+            }
+            check_writable(path)?;
+        }
+
+        let mut channels: Vec<Channel> = Vec::new();
+        for channel in args.channels {
+            if !channels.contains(&channel) {
+                channels.push(channel);
+            }
+        }
+        channels.sort_by_key(|channel| *channel as u32);
+        Ok(Self {
+            scene: args.scene,
+            output: args.output,
+            method: args.method,
+            display: (!path_traced).then(|| args.display.unwrap_or_default()),
+            bounces: args.bounces,
+            width: args.size.0,
+            height: args.size.1,
+            spp: args.spp.unwrap_or(DEFAULT_SPP),
+            seconds: args.seconds,
+            frames: args.frames,
+            camera: args.camera,
+            environment: args.env,
+            diffuse: args.diffuse,
+            light: match (args.direct_only, args.indirect_only) {
+                (true, _) => LightParts::DirectOnly,
+                (_, true) => LightParts::IndirectOnly,
+                _ => LightParts::All,
+            },
+            elements: args.elements,
+            tone: ToneSettings { operator: args.tonemap, exposure: args.exposure, ..ToneSettings::default() },
+            seed: args.seed,
+            assignments: args.set,
+            channels,
+            profile: args.profile,
+            trace: args.trace,
+            capture: args.capture,
+        })
+    }
+}
+
+impl RenderRequest {
+    /// The method's settings, typed; `S` must be the `Settings` of [`Self::method`].
+    pub fn settings<S: SettingGroup>(&self) -> Result<S, AppError> {
+        Ok(S::from_assignments(&self.assignments)?)
+    }
+
+    /// Everything that decides the picture, by name: recorded in pictures, profiles and traces.
+    pub fn record(&self) -> Result<Map<String, Value>, AppError> {
+        let camera = self.camera.as_ref().map(|camera| camera.name.as_str());
+        let environment = self.environment.as_ref().map(|environment| match environment {
+            Environment::File(path) => json!(path.display().to_string()),
+            Environment::Constant(radiance) => json!(radiance.to_array().map(|value| value.to_json())),
+        });
+        let mut record = Map::new();
+        let mut insert = |name: &str, value: Value| record.insert(name.to_owned(), value);
+        insert("method", self.method.key.into());
+        insert("bounces", self.bounces.into());
+        insert("size", json!([self.width, self.height]));
+        insert("seconds", self.seconds.to_json());
+        insert("frames", self.frames.into());
+        insert("camera", json!(camera));
+        insert("environment", json!(environment));
+        insert("diffuse", self.diffuse.into());
+        insert("light", self.light.name().into());
+        insert("elements", json!(self.elements));
+        insert("seed", self.seed.into());
+        match self.display {
+            Some(Display::Vertex) => insert("display", "vertex".into()),
+            None => insert("spp", self.spp.into()),
+        };
+        if self.output.format == Format::Png {
+            insert("exposure", self.tone.exposure.to_json());
+            insert("tonemap", serde_json::to_value(self.tone.operator)?);
+        }
+        insert("settings", self.method.record(&self.assignments)?.into());
+        Ok(record)
+    }
+}
+
+impl LightParts {
+    fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::DirectOnly => "direct",
+            Self::IndirectOnly => "indirect",
+        }
+    }
+}
+
+/// Render and write what was asked for.
+pub fn run(
+    request: &RenderRequest,
+    _global: &Global,
+    _console: &Console,
+    _out: &mut dyn Write,
+) -> Result<(), AppError> {
+    let size = (request.width, request.height);
+    Err(AppError::NoGpu(format!("this build has no GPU layer to render {}x{} pixels with", size.0, size.1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::app::cli::{Cli, Command};
+    use crate::methods::{explicit_visibility, path_tracing};
+
+    /// The request of a command line after `linklight render scene.glb -o FOLDER/out.exr`.
+    fn request(options: &[&str]) -> Result<RenderRequest, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let output = folder.path().join("out.exr");
+        let mut line = vec!["linklight", "render", "scene.glb", "-o", output.to_str().unwrap()];
+        line.extend(options);
+        match Cli::try_parse_from(line).map_err(|error| error.to_string())?.command {
+            Command::Render(args) => RenderRequest::try_from(*args).map_err(|error| error.to_string()),
+            _ => Err("another command".to_owned()),
+        }
+    }
+
+    #[test]
+    fn no_options_give_the_documented_defaults() {
+        let request = request(&[]).unwrap();
+        assert_eq!((request.method.key, request.display), ("explicit-visibility", Some(Display::Vertex)));
+        assert_eq!((request.bounces, request.frames, request.seed, request.seconds), (4, 1, 0, 0.0));
+        assert_eq!((request.width, request.height, request.light), (960, 540, LightParts::All));
+        assert_eq!(request.settings::<explicit_visibility::Settings>().unwrap(), Default::default());
+        let record = request.record().unwrap();
+        assert_eq!(record["settings"]["rays_per_element"], 256);
+        assert!(!record.contains_key("spp") && !record.contains_key("exposure"), "what has no effect is not recorded");
+    }
+
+    #[test]
+    fn options_arrive_typed() {
+        let options = "--method path-tracing --spp 9 --bounces 0 --size 8x6 --seconds 1.5 --frames 3 --camera 2 \
+                       --env 0.1,0,2 --diffuse --direct-only --elements 5000 --exposure -1 --tonemap filmic --seed 7 \
+                       --set emitter-sampling=area --channels depth,direct,depth";
+        let request = request(&options.split_whitespace().collect::<Vec<_>>()).unwrap();
+        assert_eq!((request.spp, request.bounces, request.width, request.height), (9, 0, 8, 6));
+        assert_eq!((request.seconds, request.frames, request.seed), (1.5, 3, 7));
+        assert_eq!(request.camera.as_ref().unwrap().index, Some(2));
+        assert_eq!(request.environment, Some(Environment::Constant(glam::Vec3::new(0.1, 0.0, 2.0))));
+        assert_eq!((request.diffuse, request.light, request.elements), (true, LightParts::DirectOnly, Some(5000)));
+        assert_eq!(request.tone.exposure, -1.0);
+        assert_eq!(request.channels, [Channel::Direct, Channel::Depth]);
+        let settings: path_tracing::Settings = request.settings().unwrap();
+        assert_eq!(settings.emitter_sampling, path_tracing::EmitterSampling::Area);
+        let record = request.record().unwrap();
+        assert_eq!(record["environment"], json!([0.1, 0.0, 2.0]));
+        assert_eq!((&record["spp"], &record["light"], &record["camera"]), (&json!(9), &json!("direct"), &json!("2")));
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let cases: [(&[&str], &str); 9] = [
+            (&["--spp", "4"], "applies to path-tracing only"),
+            (&["--method", "path-tracing", "--display", "vertex"], "pixels of its own"),
+            (&["--indirect-only", "--bounces", "0"], "at least 1 bounce"),
+            (&["--indirect-only", "--direct-only"], "cannot be used with"),
+            (&["--set", "rays=4"], "did you mean rotate_rays or rays_per_element?"),
+            (&["--set", "rays_per_element=4"], "from 16 to 4096"),
+            (&["--bounces", "65"], "0..=64"),
+            (&["--profile", "a.json", "--trace", "a.json"], "two outputs are called a.json"),
+            (&["--profile", "no/such/folder/a.json"], "does not exist"),
+        ];
+        for (options, expected) in cases {
+            let message = request(options).unwrap_err();
+            assert!(message.contains(expected), "{options:?}: {message}");
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Values of the command line that are more than a number or a path, each with its parser and its own complaints.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use glam::Vec3;
+
+use crate::methods::settings::suggest;
+use crate::methods::{self, METHODS, Method};
+use crate::report::image::{MAX_PIXELS, MAX_SIDE};
+
+/// Where a scene comes from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SceneSource {
+    /// A .gltf or .glb file.
+    File(PathBuf),
+    /// The name after `builtin:`.
+    Builtin(String),
+}
+
+impl FromStr for SceneSource {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Some(name) = text.strip_prefix("builtin:") {
+            return if name.is_empty() {
+                Err("a name must follow builtin:".to_owned())
+            } else {
+                Ok(Self::Builtin(name.to_owned()))
+            };
+        }
+        match extension(Path::new(text)).as_str() {
+            "gltf" | "glb" => Ok(Self::File(text.into())),
+            _ => Err("a scene is a .gltf or .glb file, or builtin:NAME".to_owned()),
+        }
+    }
+}
+
+/// A picture file to write.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Output {
+    pub path: PathBuf,
+    pub format: Format,
+}
+
+/// What a picture file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Linear radiance.
+    Exr,
+    /// Tone-mapped sRGB.
+    Png,
+}
+
+impl FromStr for Output {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let format = match extension(Path::new(text)).as_str() {
+            "exr" => Format::Exr,
+            "png" => Format::Png,
+            _ => return Err("the name must end in .exr or .png".to_owned()),
+        };
+        Ok(Self { path: text.into(), format })
+    }
+}
+
+/// A camera of the scene. A number is an index unless a camera has that name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CameraChoice {
+    pub name: String,
+    pub index: Option<usize>,
+}
+
+impl FromStr for CameraChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text.is_empty() {
+            return Err("a name or an index was expected".to_owned());
+        }
+        Ok(Self { name: text.to_owned(), index: text.parse().ok() })
+    }
+}
+
+/// Light from infinitely far away.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Environment {
+    /// An equirectangular picture of radiance.
+    File(PathBuf),
+    /// The same radiance from everywhere, W m^-2 sr^-1, linear RGB.
+    Constant(Vec3),
+}
+
+impl FromStr for Environment {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if matches!(extension(Path::new(text)).as_str(), "hdr" | "exr") {
+            return Ok(Self::File(text.into()));
+        }
+        let numbers: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse::<f32>()).collect();
+        match numbers.as_deref() {
+            Ok([red, green, blue]) => {
+                let radiance = Vec3::new(*red, *green, *blue);
+                if radiance.is_finite() && radiance.min_element() >= 0.0 {
+                    Ok(Self::Constant(radiance))
+                } else {
+                    Err("radiance must be finite and not negative".to_owned())
+                }
+            }
+            _ => Err("expected a .hdr or .exr file, or three numbers R,G,B".to_owned()),
+        }
+    }
+}
+
+/// `--method`.
+pub fn parse_method(text: &str) -> Result<&'static Method, String> {
+    methods::find(text).ok_or_else(|| {
+        let keys: Vec<&str> = METHODS.iter().map(|method| method.key).collect();
+        format!("there is no such method; {}", suggest(text, &keys))
+    })
+}
+
+/// `--size`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let form = || "expected WIDTHxHEIGHT in pixels, such as 960x540".to_owned();
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(form)?;
+    let side = |text: &str| {
+        if text.is_empty() || !text.bytes().all(|byte| byte.is_ascii_digit()) {
+            return Err(form());
+        }
+        match text.parse::<u32>() {
+            Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(side),
+            _ => Err(format!("a side is 1 to {MAX_SIDE} pixels")),
+        }
+    };
+    let (width, height) = (side(width)?, side(height)?);
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        return Err(format!(
+            "{width}x{height} is {} pixels; at most {MAX_PIXELS}",
+            u64::from(width) * u64::from(height)
+        ));
+    }
+    Ok((width, height))
+}
+
+/// `--exposure`.
+pub fn parse_exposure(text: &str) -> Result<f32, String> {
+    number_within(text, -32.0, 32.0, "stops")
+}
+
+/// `--seconds`.
+pub fn parse_animation_seconds(text: &str) -> Result<f32, String> {
+    number_within(text, 0.0, 1e6, "seconds")
+}
+
+fn number_within(text: &str, min: f32, max: f32, unit: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(number) if (min..=max).contains(&number) => Ok(number),
+        _ => Err(format!("expected a number from {min} to {max} {unit}")),
+    }
+}
+
+/// The extension in lower case, empty where there is none.
+pub fn extension(path: &Path) -> String {
+    path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("960x540"), Ok((960, 540)));
+        assert_eq!(parse_size("1X16384"), Ok((1, 16384)));
+        for bad in
+            ["", "x", "960", "960x", "x540", "0x5", "5x0", "16385x1", "-3x4", "+3x4", "3.0x4", "9x9x9", "99999999999x1"]
+        {
+            assert!(parse_size(bad).is_err(), "{bad:?}");
+        }
+        assert!(parse_size("16384x16384").unwrap_err().contains("at most"));
+    }
+
+    #[test]
+    fn environments() {
+        assert_eq!("sky.HDR".parse(), Ok(Environment::File("sky.HDR".into())));
+        assert_eq!("0, 0.5,1e1".parse(), Ok(Environment::Constant(Vec3::new(0.0, 0.5, 10.0))));
+        for bad in ["", "1,2", "1,2,3,4", "1,2,x", "-1,0,0", "nan,0,0", "inf,0,0", "sky.png"] {
+            assert!(bad.parse::<Environment>().is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn scenes_outputs_and_cameras() {
+        assert_eq!("a/b.GLB".parse(), Ok(SceneSource::File("a/b.GLB".into())));
+        assert_eq!("builtin:office".parse(), Ok(SceneSource::Builtin("office".into())));
+        for bad in ["", "a", "a.obj", "builtin:", "builtin"] {
+            assert!(bad.parse::<SceneSource>().is_err(), "{bad:?}");
+        }
+        assert_eq!("x.PNG".parse::<Output>().unwrap().format, Format::Png);
+        assert!("x.jpg".parse::<Output>().is_err() && "exr".parse::<Output>().is_err());
+        assert_eq!("3".parse::<CameraChoice>().unwrap().index, Some(3));
+        assert_eq!("door".parse::<CameraChoice>().unwrap().index, None);
+        assert!("".parse::<CameraChoice>().is_err());
+    }
+
+    #[test]
+    fn numbers_and_methods() {
+        assert_eq!(parse_exposure("-1.5"), Ok(-1.5));
+        for bad in ["", "nan", "inf", "33", "bright"] {
+            assert!(parse_exposure(bad).is_err(), "{bad:?}");
+        }
+        assert!(parse_animation_seconds("-0.1").is_err());
+        assert_eq!(parse_method("path-tracing").unwrap().key, "path-tracing");
+        assert!(parse_method("pathtracing").unwrap_err().contains("did you mean path-tracing?"));
+    }
+}

@@ -1,0 +1,25 @@
+//! What a run leaves behind: pictures, error figures, timings, traces.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`image`] | [`image::Picture`]: linear RGB with named channels; PNG, EXR and HDR files |
+//! | [`tonemap`] | scene-linear radiance to display bytes, the CPU twin of the display's last pass |
+//! | [`errors`] | how far a picture is from a reference: RMSE, relative MSE, energy, SSIM, FLIP |
+//! | [`profile`] | the `--profile` JSON file |
+//! | [`trace`] | the `--trace` file for Perfetto and `chrome://tracing` |
+//! | [`table`] | the table of passes printed at exit |
+//! | [`write`] | files written whole or not at all |
+//!
+//! Nothing here touches the GPU: timings arrive as plain [`profile::PassRecord`]s.
+
+pub mod errors;
+mod exr_file;
+pub mod heat_map;
+pub mod image;
+mod png_file;
+pub mod profile;
+mod ssim;
+pub mod table;
+pub mod tonemap;
+pub mod trace;
+pub mod write;
