@@ -60,6 +60,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Print how far picture A is from reference B
     Diff(DiffArgs),
+    /// List the GPUs, usable or not, and what they offer
+    Devices(DevicesArgs),
     /// List the methods and their settings
     Methods(MethodsArgs),
 }
@@ -203,6 +205,13 @@ pub enum HeatMap {
     Flip,
     /// Relative error of radiance, white at 100 %
     Relative,
+}
+
+#[derive(Debug, Args)]
+pub struct DevicesArgs {
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::io;
 
 use super::interrupt::Interrupted;
+use crate::gpu::GpuError;
 use crate::methods::settings::SettingError;
 use crate::report::errors::CompareError;
 use crate::report::image::PictureError;
@@ -26,8 +27,8 @@ pub enum AppError {
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     /// No usable GPU; exit code 3.
-    #[error("no usable GPU: {0}")]
-    NoGpu(String),
+    #[error(transparent)]
+    NoGpu(GpuError),
     /// Standard output could not be written; exit code 1, or 0 where its reader merely went away.
     #[error("cannot write to standard output: {0}")]
     Output(#[from] io::Error),
@@ -57,6 +58,12 @@ impl AppError {
 impl From<SettingError> for AppError {
     fn from(error: SettingError) -> Self {
         Self::Usage(error.to_string())
+    }
+}
+
+impl From<GpuError> for AppError {
+    fn from(error: GpuError) -> Self {
+        if error.is_no_device() { Self::NoGpu(error) } else { Self::failed(error) }
     }
 }
 

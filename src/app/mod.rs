@@ -4,15 +4,18 @@
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
+//! | [`devices`] | `linklight devices`: GPUs, usable or not |
 //! | [`methods`] | `linklight methods`: methods and their settings |
 //!
 //! A command writes what it was asked for to `out`; notes, progress and logs go to standard error.
 
 pub mod cli;
 pub mod console;
+pub mod devices;
 pub mod diff;
 mod error;
 pub mod interrupt;
+pub mod measure;
 pub mod methods;
 pub mod render;
 pub mod values;
@@ -30,6 +33,7 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
             render::run(&request, &cli.global, &console, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
+        cli::Command::Devices(args) => devices::run(&args, &cli.global, out),
         cli::Command::Methods(args) => methods::run(&args, out),
     }
 }

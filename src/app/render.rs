@@ -9,6 +9,7 @@ use super::AppError;
 use super::cli::{Channel, Display, Global, RenderArgs};
 use super::console::Console;
 use super::values::{CameraChoice, Environment, Format, Output, SceneSource};
+use crate::gpu::{Context, Options};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
 use crate::report::tonemap::ToneSettings;
@@ -182,14 +183,11 @@ impl LightParts {
 }
 
 /// Render and write what was asked for.
-pub fn run(
-    request: &RenderRequest,
-    _global: &Global,
-    _console: &Console,
-    _out: &mut dyn Write,
-) -> Result<(), AppError> {
-    let size = (request.width, request.height);
-    Err(AppError::NoGpu(format!("this build has no GPU layer to render {}x{} pixels with", size.0, size.1)))
+pub fn run(request: &RenderRequest, global: &Global, _console: &Console, _out: &mut dyn Write) -> Result<(), AppError> {
+    let options = Options { gpu: global.gpu.clone(), validation: global.validate, ..Options::default() };
+    let context = Context::new(options)?;
+    let device = &context.info().name;
+    Err(AppError::failed(format!("{device} is ready, but no method renders {:?} yet", request.scene)))
 }
 
 #[cfg(test)]

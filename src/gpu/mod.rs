@@ -47,4 +47,4 @@ pub use pipelines::{Cull, RasterState};
 pub use profiler::{ClockPair, Cost, PassRecord};
 pub use recorder::{Load, Recorder, Target, Threads};
 pub use reload::{Reload, ShaderWatcher, reload};
-pub use selection::{DeviceInfo, list_devices};
+pub use selection::{DeviceInfo, choose_device, list_devices};

@@ -22,13 +22,14 @@ pub struct DeviceInfo {
     /// Names of required features it lacks; empty when usable.
     pub missing: Vec<String>,
     pub optional: OptionalFeatures,
+    /// Order of preference by kind, 0 first.
+    rank: u32,
 }
 
 pub(super) struct Candidate {
     pub physical: vk::PhysicalDevice,
     pub info: DeviceInfo,
     pub support: Support,
-    rank: u32,
 }
 
 /// Every device of the instance, in the driver's order.
@@ -79,20 +80,28 @@ fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) ->
         subgroup_size: subgroup.subgroup_size,
         missing: support.missing.clone(),
         optional: support.optional,
+        rank,
     };
-    Candidate { physical, info, support, rank }
+    Candidate { physical, info, support }
 }
 
-/// Picks by index or by a part of the name (any case); without a wish the fastest kind of device.
-pub(super) fn choose(candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate, GpuError> {
-    let reasons = if candidates.is_empty() {
+/// The candidate of [`choose_device`].
+pub(super) fn choose(mut candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate, GpuError> {
+    let devices: Vec<DeviceInfo> = candidates.iter().map(|candidate| candidate.info.clone()).collect();
+    // The list is in enumeration order, so a device's index is its place.
+    choose_device(&devices, wanted).map(|device| candidates.swap_remove(device.index))
+}
+
+/// Picks a usable device by index or by a part of the name (any case); without a wish the fastest kind.
+pub fn choose_device<'d>(devices: &'d [DeviceInfo], wanted: Option<&str>) -> Result<&'d DeviceInfo, GpuError> {
+    let reasons = if devices.is_empty() {
         "the Vulkan loader found no driver (tools/setup installs one)".to_owned()
     } else {
-        let verdict = |c: &Candidate| match c.info.missing.as_slice() {
-            [] => format!("{} {} is usable", c.info.index, c.info.name),
-            missing => format!("{} {} lacks {}", c.info.index, c.info.name, missing.join(", ")),
+        let verdict = |device: &DeviceInfo| match device.missing.as_slice() {
+            [] => format!("{} {} is usable", device.index, device.name),
+            missing => format!("{} {} lacks {}", device.index, device.name, missing.join(", ")),
         };
-        candidates.iter().map(verdict).collect::<Vec<_>>().join("; ")
+        devices.iter().map(verdict).collect::<Vec<_>>().join("; ")
     };
     let matches = |info: &DeviceInfo| match wanted {
         None => true,
@@ -101,10 +110,10 @@ pub(super) fn choose(candidates: Vec<Candidate>, wanted: Option<&str>) -> Result
             Err(_) => info.name.to_lowercase().contains(&wish.to_lowercase()),
         },
     };
-    candidates
-        .into_iter()
-        .filter(|c| c.info.missing.is_empty() && matches(&c.info))
-        .min_by_key(|c| (c.rank, c.info.index))
+    devices
+        .iter()
+        .filter(|device| device.missing.is_empty() && matches(device))
+        .min_by_key(|device| (device.rank, device.index))
         .ok_or(GpuError::NoDevice { wanted: wanted.map(str::to_owned), reasons })
 }
 

@@ -10,12 +10,13 @@
 //! | `schema` | `"linklight-profile"` |
 //! | `version` | `1` |
 //! | `program` | `{name, version}` |
-//! | `device` | `{name, driver, kind, api}`: as the driver reports them |
+//! | `device` | `{name, driver, kind, api}`: as the driver reports them; `kind` as `linklight devices` shows it |
 //! | `scene` | `{name, triangles, elements, lights}` |
 //! | `settings` | object: every option and method setting in force, by name |
 //! | `frames` | frames measured; warm-up frames are not |
-//! | `passes` | in order of first call: `{name, calls, ms, bytes_read, bytes_written, counters, overlapped}` |
-//! | `passes[].name` | scopes and pass, joined by `" / "`: `"frame / explicit-visibility / bounce 2 / gather/links"` |
+//! | `passes` | in order of first call: `{path, name, calls, ms, bytes_read, bytes_written, counters, overlapped}` |
+//! | `passes[].path` | enclosing scopes and pass: `"frame/explicit-visibility/bounce 2/gather/links"`; each path once |
+//! | `passes[].name` | the pass alone: `"gather/links"` |
 //! | `passes[].calls` | over all frames |
 //! | `passes[].ms` | `{min, median, max, total}` of one call on the GPU, milliseconds |
 //! | `passes[].bytes_read`, `bytes_written` | sum over calls, as counted from the algorithm (not from the hardware) |
@@ -33,15 +34,15 @@ use serde_json::{Map, Value};
 
 use super::write::{FileError, write_text};
 
-/// Joins scopes and pass in a pass's name. Passes have slashes of their own (`gather/links`), hence the spaces.
-pub const SCOPE_SEPARATOR: &str = " / ";
 pub const SCHEMA: &str = "linklight-profile";
 pub const VERSION: u32 = 1;
 
 /// One call of one pass, as the GPU's timestamps saw it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct PassRecord {
-    /// Scopes and pass joined by [`SCOPE_SEPARATOR`].
+    /// Enclosing scopes and the pass, joined by slashes: `frame/explicit-visibility/bounce 2/gather/links`.
+    pub path: String,
+    /// The pass alone: `gather/links`, the end of `path`.
     pub name: String,
     /// Nanoseconds on the GPU's clock.
     pub start_ns: u64,
@@ -81,7 +82,7 @@ pub struct Device {
     pub name: String,
     /// Name and version of the driver.
     pub driver: String,
-    /// `discrete`, `integrated`, `virtual`, `cpu` or `other`.
+    /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `CPU` or `other`.
     pub kind: String,
     /// Vulkan version the device reports, `1.3.289`.
     pub api: String,
@@ -96,9 +97,10 @@ pub struct SceneFacts {
     pub lights: u64,
 }
 
-/// All calls of one pass.
+/// All calls of one pass in the same scopes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Pass {
+    pub path: String,
     pub name: String,
     pub calls: u64,
     pub ms: Milliseconds,
@@ -197,35 +199,38 @@ impl Profile {
     }
 }
 
-/// One [`Pass`] per name, in order of first call.
+/// One [`Pass`] per path, in order of first call.
 pub fn summarise(records: &[PassRecord]) -> Vec<Pass> {
-    let mut groups: Vec<(&str, Vec<&PassRecord>)> = Vec::new();
+    let mut groups: Vec<Vec<&PassRecord>> = Vec::new();
     let mut index_of = std::collections::HashMap::new();
     for record in records {
-        let index = *index_of.entry(record.name.as_str()).or_insert_with(|| {
-            groups.push((&record.name, Vec::new()));
+        let index = *index_of.entry(record.path.as_str()).or_insert_with(|| {
+            groups.push(Vec::new());
             groups.len() - 1
         });
-        groups[index].1.push(record);
+        groups[index].push(record);
     }
-    groups.into_iter().map(|(name, calls)| summarise_calls(name, &calls)).collect()
+    groups.iter().filter_map(|calls| summarise_calls(calls)).collect()
 }
 
-fn summarise_calls(name: &str, calls: &[&PassRecord]) -> Pass {
+/// `None` without calls.
+fn summarise_calls(calls: &[&PassRecord]) -> Option<Pass> {
+    let first = calls.first()?;
     let mut counters: Map<String, Value> = Map::new();
     for (counter, count) in calls.iter().flat_map(|call| &call.counters) {
         let sum = counters.get(counter).and_then(Value::as_u64).unwrap_or(0).saturating_add(*count);
         counters.insert(counter.clone(), sum.into());
     }
-    Pass {
-        name: name.to_owned(),
+    Some(Pass {
+        path: first.path.clone(),
+        name: first.name.clone(),
         calls: calls.len() as u64,
         ms: Milliseconds::of(calls.iter().map(|call| call.end_ns.saturating_sub(call.start_ns)).collect()),
         bytes_read: calls.iter().map(|call| call.bytes_read).sum(),
         bytes_written: calls.iter().map(|call| call.bytes_written).sum(),
         counters,
         overlapped: calls.iter().any(|call| call.overlapped),
-    }
+    })
 }
 
 impl Milliseconds {
@@ -243,17 +248,19 @@ impl Milliseconds {
 pub(super) mod tests {
     use super::*;
 
-    pub(in crate::report) fn record(name: &str, start_ns: u64, end_ns: u64) -> PassRecord {
-        PassRecord { name: name.to_owned(), start_ns, end_ns, ..PassRecord::default() }
+    /// A call of `name` inside `scopes`.
+    pub(in crate::report) fn record(scopes: &str, name: &str, start_ns: u64, end_ns: u64) -> PassRecord {
+        let path = format!("{scopes}/{name}");
+        PassRecord { path, name: name.to_owned(), start_ns, end_ns, ..PassRecord::default() }
     }
 
     fn sample() -> Profile {
         let mut records = vec![
-            record("frame / a", 0, 4_000_000),
-            record("frame / b", 4_000_000, 5_000_000),
-            record("frame / a", 5_000_000, 6_000_000),
-            record("frame / a", 6_000_000, 8_000_000),
-            record("frame / a", 8_000_000, 16_000_000),
+            record("frame", "bvh/a", 0, 4_000_000),
+            record("frame", "bvh/b", 4_000_000, 5_000_000),
+            record("frame", "bvh/a", 5_000_000, 6_000_000),
+            record("frame", "bvh/a", 6_000_000, 8_000_000),
+            record("frame", "bvh/a", 8_000_000, 16_000_000),
         ];
         for (index, record) in records.iter_mut().enumerate() {
             record.bytes_read = 100;
@@ -271,7 +278,8 @@ pub(super) mod tests {
         let profile = sample();
         assert_eq!(profile.passes.len(), 2);
         let pass = &profile.passes[0];
-        assert_eq!((pass.name.as_str(), pass.calls, pass.bytes_read, pass.bytes_written), ("frame / a", 4, 400, 9));
+        assert_eq!((pass.path.as_str(), pass.name.as_str()), ("frame/bvh/a", "bvh/a"));
+        assert_eq!((pass.calls, pass.bytes_read, pass.bytes_written), (4, 400, 9));
         assert_eq!((pass.ms.min, pass.ms.median, pass.ms.max, pass.ms.total), (1.0, 3.0, 8.0, 15.0));
         assert_eq!(pass.counters["links made"], 28);
         assert!(pass.overlapped && !profile.passes[1].overlapped);
@@ -281,7 +289,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_timestamp_that_runs_backwards_counts_as_no_time() {
-        assert_eq!(summarise(&[record("a", 5, 3)])[0].ms, Milliseconds::default());
+        assert_eq!(summarise(&[record("frame", "a", 5, 3)])[0].ms, Milliseconds::default());
         assert!(summarise(&[]).is_empty());
     }
 

@@ -12,7 +12,7 @@ pub fn render(passes: &[Pass]) -> String {
     let mut order: Vec<&Pass> = passes.iter().collect();
     order.sort_by(|a, b| b.ms.total.total_cmp(&a.ms.total));
     let total: f64 = passes.iter().map(|pass| pass.ms.total).sum();
-    let width = order.iter().map(|pass| pass.name.chars().count()).max().unwrap_or(0).max("pass".len());
+    let width = order.iter().map(|pass| pass.path.chars().count()).max().unwrap_or(0).max("pass".len());
 
     let mut table = String::new();
     let header = ["calls", "ms min", "median", "max", "total", "%"];
@@ -28,7 +28,7 @@ pub fn render(passes: &[Pass]) -> String {
         let _ = writeln!(
             table,
             "{:width$} {:>8} {mark}{:>9.3} {:>10.3} {:>10.3} {:>11.3} {share:>6.1}",
-            pass.name, pass.calls, pass.ms.min, pass.ms.median, pass.ms.max, pass.ms.total
+            pass.path, pass.calls, pass.ms.min, pass.ms.median, pass.ms.max, pass.ms.total
         );
     }
     let calls: u64 = passes.iter().map(|pass| pass.calls).sum();
@@ -48,14 +48,14 @@ mod tests {
 
     #[test]
     fn passes_are_sorted_and_aligned() {
-        let mut records = vec![record("frame / short", 0, 1_000_000), record("frame / a longer name", 0, 3_000_000)];
+        let mut records = vec![record("frame", "short", 0, 1_000_000), record("frame", "a longer name", 0, 3_000_000)];
         records[0].overlapped = true;
         let table = render(&summarise(&records));
         let expected = "\
-pass                     calls     ms min     median        max       total      %
-frame / a longer name        1      3.000      3.000      3.000       3.000   75.0
-frame / short                1 ~    1.000      1.000      1.000       1.000   25.0
-sum                          2                                        4.000  100.0
+pass                   calls     ms min     median        max       total      %
+frame/a longer name        1      3.000      3.000      3.000       3.000   75.0
+frame/short                1 ~    1.000      1.000      1.000       1.000   25.0
+sum                        2                                        4.000  100.0
 ~ ran beside another pass: its times share the GPU
 ";
         assert_eq!(table, expected);

@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use serde_json::{Map, Value, json};
 
-use super::profile::{PassRecord, SCOPE_SEPARATOR};
+use super::profile::PassRecord;
 use super::write::{FileError, write_text};
 
 const CPU_PROCESS: u32 = 1;
@@ -65,6 +65,25 @@ impl TimeLine {
         result
     }
 
+    /// Lay a device's clock beside this time line: `read` gives (device nanoseconds, deviation in nanoseconds) for the
+    /// moment it runs. The tightest of a few readings is taken; half its duration adds to the deviation.
+    pub fn calibrate(&self, mut read: impl FnMut() -> Option<(u64, u64)>) -> Clock {
+        const READINGS: usize = 8;
+        let mut best = Clock::Uncalibrated;
+        let mut best_deviation = u64::MAX;
+        for _ in 0..READINGS {
+            let before = self.ns_at(Instant::now());
+            let Some((gpu_ns, deviation)) = read() else { continue };
+            let duration = self.ns_at(Instant::now()).saturating_sub(before);
+            let max_deviation_ns = deviation.saturating_add(duration.div_ceil(2));
+            if max_deviation_ns < best_deviation {
+                best_deviation = max_deviation_ns;
+                best = Clock::Calibrated { gpu_ns, cpu_ns: before + duration / 2, max_deviation_ns };
+            }
+        }
+        best
+    }
+
     /// Everything collected so far.
     pub fn spans(&self) -> Vec<CpuSpan> {
         self.spans.lock().unwrap_or_else(std::sync::PoisonError::into_inner).clone()
@@ -114,10 +133,16 @@ pub fn to_json(cpu: &[CpuSpan], gpu: &[PassRecord], clock: Clock, about: &Map<St
         args.insert("bytes written".to_owned(), pass.bytes_written.into());
         args.insert("overlapped".to_owned(), pass.overlapped.into());
         args.extend(pass.counters.iter().map(|(name, count)| (name.clone(), (*count).into())));
-        let name = pass.name.rsplit(SCOPE_SEPARATOR).next().unwrap_or(&pass.name);
         let (start, end) = (i128::from(pass.start_ns) + offset_ns, i128::from(pass.end_ns) + offset_ns);
         // Passes that share the GPU cannot be drawn as nested bars: a track of their own.
-        events.push(complete_event(name, GPU_PROCESS, usize::from(pass.overlapped), start, end, Value::Object(args)));
+        events.push(complete_event(
+            &pass.name,
+            GPU_PROCESS,
+            usize::from(pass.overlapped),
+            start,
+            end,
+            Value::Object(args),
+        ));
     }
     if gpu.iter().any(|pass| pass.overlapped) {
         events.push(name_event("thread_name", GPU_PROCESS, 1, "queue, overlapping passes"));
@@ -150,8 +175,8 @@ fn scopes(passes: &[PassRecord]) -> Vec<Scope<'_>> {
     let mut closed: Vec<Scope> = Vec::new();
     let mut open: Vec<Scope> = Vec::new();
     for pass in passes.iter().filter(|pass| !pass.overlapped) {
-        let mut path: Vec<&str> = pass.name.split(SCOPE_SEPARATOR).collect();
-        path.pop();
+        let scopes = pass.path.strip_suffix(&pass.name).unwrap_or_default();
+        let path: Vec<&str> = scopes.split('/').filter(|scope| !scope.is_empty()).collect();
         let shared = open.iter().zip(&path).take_while(|(scope, name)| scope.name == **name).count();
         closed.extend(open.drain(shared..));
         for scope in &mut open {
@@ -201,9 +226,9 @@ mod tests {
     fn sample() -> (Vec<CpuSpan>, Vec<PassRecord>) {
         let span = CpuSpan { name: "load".into(), thread: "main".into(), start_ns: 2_000, end_ns: 5_000 };
         let passes = vec![
-            record("frame / m / bounce 0 / gather/links", 1_000_000, 1_001_000),
-            record("frame / m / bounce 1 / gather/links", 1_002_000, 1_003_000),
-            record("frame / tone-map", 1_004_000, 1_005_000),
+            record("frame/m/bounce 0", "gather/links", 1_000_000, 1_001_000),
+            record("frame/m/bounce 1", "gather/links", 1_002_000, 1_003_000),
+            record("frame", "tone-map", 1_004_000, 1_005_000),
         ];
         (vec![span], passes)
     }
@@ -238,13 +263,30 @@ mod tests {
 
     #[test]
     fn counters_become_arguments_and_overlapping_passes_a_track() {
-        let mut pass = record("frame / a", 0, 10);
+        let mut pass = record("frame", "a", 0, 10);
         pass.counters = vec![("links made".into(), 12)];
         pass.overlapped = true;
         let trace = to_json(&[], &[pass], Clock::Uncalibrated, &Map::new());
         let events = trace["traceEvents"].as_array().unwrap();
         let event = events.iter().find(|event| event["name"] == "a").unwrap();
         assert_eq!((&event["args"]["links made"], &event["tid"]), (&json!(12), &json!(1)));
+    }
+
+    #[test]
+    fn calibration_takes_the_tightest_reading_or_none() {
+        let line = TimeLine::default();
+        assert_eq!(line.calibrate(|| None), Clock::Uncalibrated);
+        let mut reading = 0;
+        let clock = line.calibrate(|| {
+            reading += 1;
+            if reading != 3 {
+                std::thread::sleep(std::time::Duration::from_millis(2));
+            }
+            Some((reading, 5))
+        });
+        let Clock::Calibrated { gpu_ns, max_deviation_ns, .. } = clock else { panic!("{clock:?}") };
+        assert_eq!(gpu_ns, 3);
+        assert!((5..1_000_000).contains(&max_deviation_ns), "{max_deviation_ns}");
     }
 
     #[test]
