@@ -3,20 +3,11 @@
 # shellcheck shell=bash
 
 linklight_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-linklight_target=$(realpath -m "${CARGO_TARGET_DIR:-$linklight_root/target}")
+linklight_target=${CARGO_TARGET_DIR:-$linklight_root/target}
+case $linklight_target in /*) ;; *) linklight_target=$PWD/$linklight_target ;; esac
 
-# The driver, named: machines often carry drivers for hardware that is not there. Tests use lavapipe everywhere.
-use_lavapipe() {
-    local manifest
-    [ -z "${VK_DRIVER_FILES-}${VK_ICD_FILENAMES-}" ] || return 0
-    for manifest in /usr/share/vulkan/icd.d/lvp_icd."$(uname -m)".json /usr/share/vulkan/icd.d/lvp_icd.json; do
-        [ -r "$manifest" ] || continue
-        export VK_DRIVER_FILES=$manifest
-        return 0
-    done
-    echo 'linklight: no lavapipe driver under /usr/share/vulkan/icd.d; run tools/setup --test' >&2
-    return 1
-}
+# shellcheck source=tools/drivers.sh
+. "$linklight_root/tools/drivers.sh"
 
 # Drivers and window systems complain, or refuse, without a private run-time folder.
 use_runtime_folder() {
