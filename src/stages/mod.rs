@@ -1,4 +1,5 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
+pub mod film;
 pub mod scan;
 pub mod world;

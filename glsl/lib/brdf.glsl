@@ -1,0 +1,62 @@
+#ifndef LIB_BRDF
+#define LIB_BRDF
+// The one material model: Lambert under GGX with height-correlated Smith masking and Schlick's Fresnel term.
+//                                                                                [Walter2007; Heitz2014; glTF 2.0 B.3]
+// Directions are unit and point away from the surface. An eye below the plane of the shading normal (interpolated and
+// mapped normals allow it) is folded above it: silhouettes would turn black otherwise.
+#include "lib/hemisphere.glsl"
+#include "lib/material.glsl"
+
+vec3 folded_eye(vec3 normal, vec3 to_eye)
+{
+    return to_eye - 2.0 * min(dot(normal, to_eye), 0.0) * normal;
+}
+
+vec3 schlick_fresnel(Surface s, float cos_half)
+{
+    float m = clamp(1.0 - cos_half, 0.0, 1.0);
+    float m2 = m * m;
+    return s.f0 + (vec3(s.f90) - s.f0) * (m2 * m2 * m);
+}
+
+// Density of microfacet normals, sr^-1. |n x h|^2 stands for 1 - cos^2, which loses its digits near the peak.
+float ggx_distribution(vec3 normal, vec3 halfway, float alpha)
+{
+    vec3 sine = cross(normal, halfway);
+    float cosine = dot(normal, halfway);
+    float a = alpha * alpha;
+    float d = dot(sine, sine) + a * cosine * cosine;
+    return a / (PI * d * d);
+}
+
+// sqrt(alpha^2 + (1 - alpha^2) cos^2): Smith's function of one direction is 2 cos / (cos + smith_root).
+float smith_root(float cosine, float alpha)
+{
+    float a = alpha * alpha;
+    return sqrt(a + (1.0 - a) * cosine * cosine);
+}
+
+bool has_specular(Surface s) { return s.f90 > 0.0 || s.f0 != vec3(0.0); }
+
+// Reflected radiance per arriving irradiance, sr^-1; the cosine towards the light is the caller's.
+vec3 brdf_value(Surface s, vec3 to_eye, vec3 to_light)
+{
+    float cos_light = dot(s.normal, to_light);
+    if (!s.reflects || cos_light <= 0.0) return vec3(0.0);
+    if (!has_specular(s)) return s.albedo / PI;
+
+    to_eye = folded_eye(s.normal, to_eye);
+    float cos_eye = max(dot(s.normal, to_eye), 1e-6);
+    vec3 sum = to_eye + to_light;
+    float squared = dot(sum, sum);
+    if (squared < 1e-12) return s.albedo / PI;
+    vec3 halfway = sum / sqrt(squared);
+
+    vec3 fresnel = schlick_fresnel(s, dot(to_eye, halfway));
+    float shadowing = 0.5 / (cos_light * smith_root(cos_eye, s.alpha) + cos_eye * smith_root(cos_light, s.alpha));
+    float specular = ggx_distribution(s.normal, halfway, s.alpha) * shadowing;
+    // What the upper layer reflects does not reach the lower one.          [KHR_materials_specular, "dielectric_brdf"]
+    float passed = 1.0 - max(fresnel.r, max(fresnel.g, fresnel.b));
+    return s.albedo * (passed / PI) + fresnel * specular;
+}
+#endif
