@@ -15,6 +15,25 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Rows of (row, value) pairs; values keep their order within a row. Rows must be below `row_count`.
+    pub fn collect(row_count: u32, pairs: impl Iterator<Item = (u32, u32)> + Clone) -> Self {
+        let mut offsets = vec![0u32; row_count as usize + 1];
+        for (row, _) in pairs.clone() {
+            offsets[row as usize + 1] += 1;
+        }
+        for row in 1..offsets.len() {
+            offsets[row] += offsets[row - 1];
+        }
+        let mut next = offsets.clone();
+        let mut values = vec![0u32; offsets[row_count as usize] as usize];
+        for (row, value) in pairs {
+            let slot = &mut next[row as usize];
+            values[*slot as usize] = value;
+            *slot += 1;
+        }
+        Self { offsets, values }
+    }
+
     pub fn row(&self, index: u32) -> &[u32] {
         let index = index as usize;
         &self.values[self.offsets[index] as usize..self.offsets[index + 1] as usize]
@@ -27,23 +46,8 @@ impl Rows {
 
 /// Triangles that touch each vertex, in rising order. Indices must be below `vertex_count`.
 pub fn incident_triangles(vertex_count: u32, triangles: &[[u32; 3]]) -> Rows {
-    let mut offsets = vec![0u32; vertex_count as usize + 1];
-    for &index in triangles.iter().flatten() {
-        offsets[index as usize + 1] += 1;
-    }
-    for row in 1..offsets.len() {
-        offsets[row] += offsets[row - 1];
-    }
-    let mut next = offsets.clone();
-    let mut values = vec![0u32; triangles.len() * 3];
-    for (triangle, corners) in triangles.iter().enumerate() {
-        for &index in corners {
-            let slot = &mut next[index as usize];
-            values[*slot as usize] = triangle as u32;
-            *slot += 1;
-        }
-    }
-    Rows { offsets, values }
+    let corners = triangles.iter().enumerate();
+    Rows::collect(vertex_count, corners.flat_map(|(triangle, corners)| corners.map(|vertex| (vertex, triangle as u32))))
 }
 
 /// Vertices that share a triangle with each vertex, itself left out, in rising order, each once.
@@ -87,20 +91,8 @@ pub struct Weld {
 impl Weld {
     /// The vertices of each group, in rising order.
     pub fn members(&self) -> Rows {
-        let mut offsets = vec![0u32; self.group_count as usize + 1];
-        for &group in &self.group_of {
-            offsets[group as usize + 1] += 1;
-        }
-        for row in 1..offsets.len() {
-            offsets[row] += offsets[row - 1];
-        }
-        let mut next = offsets.clone();
-        let mut values = vec![0u32; self.group_of.len()];
-        for (vertex, &group) in self.group_of.iter().enumerate() {
-            values[next[group as usize] as usize] = vertex as u32;
-            next[group as usize] += 1;
-        }
-        Rows { offsets, values }
+        let vertices = self.group_of.iter().enumerate();
+        Rows::collect(self.group_count, vertices.map(|(vertex, &group)| (group, vertex as u32)))
     }
 }
 

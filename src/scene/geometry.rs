@@ -131,6 +131,16 @@ impl GeometryCounts {
 
     /// Refuses what cannot be indexed by u32 or exceeds the budget.
     pub fn check(&self, what: &'static str, max_memory_bytes: u64) -> Result<(), GeometryError> {
+        self.check_beside(what, 0, max_memory_bytes)
+    }
+
+    /// As [`Self::check`], `beside` bytes being held at the same time.
+    pub(super) fn check_beside(
+        &self,
+        what: &'static str,
+        beside: u64,
+        max_memory_bytes: u64,
+    ) -> Result<(), GeometryError> {
         let allowed = u64::from(u32::MAX);
         for (what, needed) in [
             ("vertices", self.vertices),
@@ -143,7 +153,7 @@ impl GeometryCounts {
                 return Err(GeometryError::TooMany { what, needed, allowed });
             }
         }
-        let needed = self.bytes();
+        let needed = self.bytes().saturating_add(beside);
         if needed > max_memory_bytes {
             return Err(GeometryError::OutOfMemory { what, needed, available: max_memory_bytes });
         }

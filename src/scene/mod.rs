@@ -17,6 +17,7 @@ pub mod geometry;
 pub mod gltf;
 pub mod pose;
 pub mod shapes;
+pub mod tessellate;
 
 pub use gltf::{LoadOptions, SceneChoice, SceneError, load, load_bytes, load_bytes_with};
 

@@ -6,3 +6,4 @@ mod environment;
 mod geometry;
 mod made;
 mod pose;
+mod tessellation;
