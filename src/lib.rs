@@ -1,5 +1,6 @@
 //! **linklight**: a Vulkan-native global-illumination renderer.
 pub mod app;
+pub mod display;
 pub mod gpu;
 pub mod methods;
 pub mod report;

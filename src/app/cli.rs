@@ -158,7 +158,7 @@ pub enum Channel {
     Albedo,
     /// normal.X, .Y, .Z: unit normal in world space
     Normal,
-    /// depth.Z: distance from the camera along its axis, metres
+    /// depth.Z: distance from the camera along the pixel's ray, metres
     Depth,
 }
 

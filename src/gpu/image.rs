@@ -267,7 +267,7 @@ pub struct SamplerDescription {
     pub mip_linear: bool,
     /// Levels beyond the first are read.
     pub mipmapped: bool,
-    /// A depth comparison sampler: returns the share of texels with reference <= texel.
+    /// A depth comparison sampler: returns the share of texels with reference >= texel (depth is reversed).
     pub compare: bool,
 }
 
@@ -309,7 +309,7 @@ impl Sampler {
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
             .max_lod(if d.mipmapped { vk::LOD_CLAMP_NONE } else { 0.0 })
             .compare_enable(d.compare)
-            .compare_op(vk::CompareOp::LESS_OR_EQUAL);
+            .compare_op(vk::CompareOp::GREATER_OR_EQUAL);
         // SAFETY: complete create info.
         let raw = unsafe { device.raw.create_sampler(&info, None) }.checked("vkCreateSampler", name)?;
         device.set_name(raw, name);

@@ -23,14 +23,12 @@ pub enum Cull {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct RasterState {
     pub cull: Cull,
-    /// Draw only nearer than the depth image, and write it.
+    /// Draw only what is nearer than the depth image, and write it. Depth is reversed everywhere: 1 near, 0 far.
     pub depth_test: bool,
     /// Add to the colour image instead of replacing it.
     pub additive: bool,
     /// Draw lines along triangle edges' vertices (line list) instead of triangles.
     pub lines: bool,
-    /// Push depth away by a constant and a slope share, in units of the depth format: (constant, slope in 1/16).
-    pub depth_bias: (u8, u8),
 }
 
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -294,16 +292,13 @@ impl Pipelines {
             // Counter-clockwise in glTF's y-up world is counter-clockwise in a y-down framebuffer seen through
             // a projection that flips y.
             .front_face(vk::FrontFace::COUNTER_CLOCKWISE)
-            .depth_bias_enable(state.depth_bias != (0, 0))
-            .depth_bias_constant_factor(f32::from(state.depth_bias.0))
-            .depth_bias_slope_factor(f32::from(state.depth_bias.1) / 16.0)
             .line_width(1.0);
         let multisample =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth_state = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(state.depth_test)
             .depth_write_enable(state.depth_test)
-            .depth_compare_op(vk::CompareOp::LESS);
+            .depth_compare_op(vk::CompareOp::GREATER);
         let blend = vk::PipelineColorBlendAttachmentState {
             blend_enable: vk::Bool32::from(state.additive),
             src_color_blend_factor: vk::BlendFactor::ONE,

@@ -1,0 +1,131 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/brdf.glsl"
+#include "lib/environment.glsl"
+#include "lib/light.glsl"
+#include "lib/shadow.glsl"
+#include "lib/specular_albedo.glsl"
+
+// One thread per pixel: punctual light by shadow maps, all other light interpolated between the vertices' irradiance.
+// reads the G-buffer, triangles, positions, direct_irradiance and indirect_irradiance [vertex_count] (W/m2), lights,
+//       shadow maps, the environment   updates direct, indirect, albedo, normal, depth [pixel_count]   shared none
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
+layout(set = 0, binding = 1) uniform sampler2D g_position;
+layout(set = 0, binding = 2) uniform sampler2D g_normal;
+layout(set = 0, binding = 3) uniform sampler2D g_albedo;
+layout(set = 0, binding = 4) uniform sampler2D g_specular;
+layout(set = 0, binding = 5) uniform sampler2D g_emission;
+layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer DirectIrradiance { vec3 direct_irradiance[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer IndirectIrradiance { vec3 indirect_irradiance[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Lights { Light lights[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer ShadowViews { ShadowView shadow_views[]; };
+layout(set = 0, binding = 13) uniform sampler2DArrayShadow shadow_maps;
+layout(set = 0, binding = 14, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
+layout(set = 0, binding = 15) uniform sampler2D environment_map;
+layout(set = 0, binding = 16, scalar) buffer Direct { vec3 direct[]; };
+layout(set = 0, binding = 17, scalar) buffer Indirect { vec3 indirect[]; };
+layout(set = 0, binding = 18, scalar) buffer AlbedoSum { vec3 albedo[]; };
+layout(set = 0, binding = 19, scalar) buffer NormalSum { vec3 normal[]; };
+layout(set = 0, binding = 20, scalar) buffer DepthSum { float depth[]; };
+// eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
+layout(push_constant, scalar) uniform Params {
+    mat4 clip_from_world;
+    vec4 eye;
+    vec3 forward;
+    float eye_along;    // the eye's place along forward, metres
+    uint light_count;
+    float weight;
+    uint is_first;
+} params;
+
+vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
+
+// Share of a light's view that is free towards `point`: 3 x 3 bilinear comparisons one texel apart. The point is
+// moved off its surface by what a texel covers there, so that a surface does not shadow itself.
+float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 to_light, float distance_to_light)
+{
+    ShadowLight views = shadow_lights[light];
+    if (views.count == 0) return 1.0;
+    uint layer = views.first + (views.count == 6 ? cube_face(-to_light) : 0u);
+    ShadowView view = shadow_views[layer];
+    float texel = view.texel_extent > 0.0 ? view.texel_extent : view.texel_angle * distance_to_light;
+    // At grazing angles a texel covers much depth: more along the normal, little along the light.
+    float slope = sqrt(max(1.0 - pow(dot(surface_normal, to_light), 2.0), 0.0));
+    vec3 moved = point + surface_normal * (2.5 * texel * slope) + to_light * (1.0 * texel);
+    vec4 clip = view.clip_from_world * vec4(moved, 1.0);
+    if (clip.w <= 0.0) return 1.0;
+    vec3 at = clip.xyz / clip.w;
+    vec2 uv = at.xy * 0.5 + 0.5;
+    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 1.0;
+
+    vec2 step_uv = 1.0 / vec2(textureSize(shadow_maps, 0).xy);
+    float sum = 0.0;
+    for (int y = -1; y <= 1; ++y)
+        for (int x = -1; x <= 1; ++x)
+            sum += texture(shadow_maps, vec4(uv + vec2(x, y) * step_uv, layer, at.z));
+    return sum / 9.0;
+}
+
+void add(uint index, vec3 direct_value, vec3 indirect_value, vec3 albedo_value, vec3 normal_value, float depth_value)
+{
+    float w = params.weight;
+    bool first = params.is_first != 0;
+    direct[index] = (first ? vec3(0.0) : direct[index]) + w * direct_value;
+    indirect[index] = (first ? vec3(0.0) : indirect[index]) + w * indirect_value;
+    albedo[index] = (first ? vec3(0.0) : albedo[index]) + w * albedo_value;
+    normal[index] = (first ? vec3(0.0) : normal[index]) + w * normal_value;
+    depth[index] = (first ? 0.0 : depth[index]) + w * depth_value;
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = textureSize(visible_triangles, 0);
+    if (any(greaterThanEqual(pixel, size))) return;
+    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
+    uint seen = texelFetch(visible_triangles, pixel, 0).x;
+    if (seen == 0) {
+        // The background: along the ray through the pixel.
+        vec2 ndc = (vec2(pixel) + 0.5) * 2.0 / vec2(size) - 1.0;
+        vec4 near = inverse(params.clip_from_world) * vec4(ndc, 1.0, 1.0);
+        vec3 direction = params.eye.w == 0.0 ? params.forward : normalize(near.xyz / near.w - params.eye.xyz);
+        add(index, environment_radiance(environment_info[0], direction), vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+        return;
+    }
+
+    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
+    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
+    vec4 emitted = texelFetch(g_emission, pixel, 0);
+    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
+    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, emitted.rgb, n.xyz, emitted.w > 0.5);
+
+    vec3 direct_sum = s.emission, indirect_sum = vec3(0.0);
+    if (s.reflects) {
+        uvec3 v = triangles[seen - 1];
+        vec3 geometric = normalize(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]));
+        if (dot(geometric, to_eye) < 0.0) geometric = -geometric;
+
+        for (uint light = 0; light < params.light_count; ++light) {
+            vec3 to_light;
+            float distance_to_light;
+            vec3 arriving = light_irradiance(lights[light], position.xyz, to_light, distance_to_light);
+            float cosine = dot(s.normal, to_light);
+            if (cosine <= 0.0 || dot(geometric, to_light) <= 0.0 || arriving == vec3(0.0)) continue;
+            float lit = lit_share(light, position.xyz, geometric, to_light, distance_to_light);
+            if (lit > 0.0) direct_sum += brdf_value(s, to_eye, to_light) * arriving * (cosine * lit);
+        }
+
+        // Interpolated irradiance reflects as if it came evenly from all sides, the specular lobe included.
+        vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
+        vec3 reflectance = (s.albedo + specular_albedo(s, dot(s.normal, to_eye))) / PI;
+        direct_sum += reflectance * (w.x * direct_irradiance[v.x] + w.y * direct_irradiance[v.y] + w.z * direct_irradiance[v.z]);
+        indirect_sum = reflectance * (w.x * indirect_irradiance[v.x] + w.y * indirect_irradiance[v.y] + w.z * indirect_irradiance[v.z]);
+    }
+    float along = dot(position.xyz, params.forward) - params.eye_along;
+    float distance_to_eye = params.eye.w == 0.0 ? along : distance(position.xyz, params.eye.xyz);
+    add(index, direct_sum, indirect_sum, s.albedo, s.normal, distance_to_eye);
+}

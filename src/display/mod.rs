@@ -1,0 +1,55 @@
+//! From a solution to pixels: direct light with shadow maps, the G-buffer, the display stages.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`shadow_maps`] | reversed depth of every view of every punctual light |
+//! | [`g_buffer`] | which triangle each pixel sees, and the surface there |
+//! | [`vertex`] | the display stage that interpolates irradiance between vertices |
+//!
+//! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
+//! comes after, in [`crate::report::tonemap`].
+
+pub mod g_buffer;
+pub mod shadow_maps;
+pub mod vertex;
+
+use crate::scene::camera::{Lens, View};
+use glam::{Mat4, UVec2, Vec2, Vec3};
+
+/// A view as the passes of a picture take it: shifted within the pixel for antialiasing.
+#[derive(Debug, Clone, Copy)]
+pub struct PixelView {
+    pub clip_from_world: Mat4,
+    /// Position and 1, or for an orthographic view the direction to the eye and 0.
+    pub eye: [f32; 4],
+    /// Unit.
+    pub forward: Vec3,
+    /// The eye's place along `forward`, metres.
+    pub eye_along: f32,
+}
+
+impl PixelView {
+    /// `offset` in -0.5..0.5 pixels from the pixels' centres.
+    pub fn new(view: &View, size: UVec2, offset: Vec2) -> Self {
+        let shift = -2.0 * offset / size.as_vec2();
+        let eye = match view.lens {
+            Lens::Perspective { .. } => view.position.extend(1.0),
+            Lens::Orthographic { .. } => (-view.forward).extend(0.0),
+        };
+        Self {
+            clip_from_world: Mat4::from_translation(shift.extend(0.0)) * view.clip_from_world(),
+            eye: eye.to_array(),
+            forward: view.forward,
+            eye_along: view.position.dot(view.forward),
+        }
+    }
+}
+
+/// Offsets within the pixel of `count` samples: the R2 sequence, evenly spread for any count.       [Roberts2018]
+pub fn sample_offset(index: u32, count: u32) -> Vec2 {
+    if count == 1 {
+        return Vec2::ZERO;
+    }
+    let along = |step: f64| ((0.5 + step * f64::from(index + 1)).fract() - 0.5) as f32;
+    Vec2::new(along(0.754_877_666_246_692_8), along(0.569_840_290_998_053_2))
+}

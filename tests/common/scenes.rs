@@ -1,0 +1,75 @@
+//! Small scenes made by hand, for closed forms.
+
+use glam::{Vec2, Vec3, Vec4};
+use linklight::scene::{Light, LightKind, Material, Mesh, Node, Primitive, Scene, Transform};
+
+/// A Lambertian two-sided material.
+pub fn lambert(albedo: Vec3) -> Material {
+    Material {
+        name: "lambert".into(),
+        base_color: albedo.extend(1.0),
+        base_color_texture: None,
+        metallic: 0.0,
+        roughness: 1.0,
+        metallic_roughness_texture: None,
+        normal_texture: None,
+        normal_scale: 1.0,
+        occlusion_texture: None,
+        occlusion_strength: 1.0,
+        emission: Vec3::ZERO,
+        emission_texture: None,
+        alpha_cutoff: None,
+        double_sided: true,
+        unlit: false,
+        ior: 1.5,
+        specular: 0.0,
+        specular_color: Vec3::ONE,
+    }
+}
+
+/// A parallelogram from `corner` along `u` and `v`, facing u x v, as `cells` x `cells` squares.
+pub fn parallelogram(corner: Vec3, u: Vec3, v: Vec3, cells: u32, material: u32) -> Primitive {
+    let normal = u.cross(v).normalize();
+    let side = cells + 1;
+    let at = |i: u32| Vec2::new((i % side) as f32, (i / side) as f32) / cells as f32;
+    let count = side * side;
+    let uv: Vec<Vec2> = (0..count).map(at).collect();
+    let mut triangles = Vec::new();
+    for y in 0..cells {
+        for x in 0..cells {
+            let a = y * side + x;
+            triangles.extend([[a, a + 1, a + side + 1], [a, a + side + 1, a + side]]);
+        }
+    }
+    Primitive {
+        positions: uv.iter().map(|t| corner + u * t.x + v * t.y).collect(),
+        normals: vec![normal; count as usize],
+        tangents: vec![u.normalize().extend(1.0); count as usize],
+        uv: [uv.clone(), uv],
+        colors: vec![Vec4::ONE; count as usize],
+        triangles,
+        material,
+        ..Primitive::default()
+    }
+}
+
+/// One node per primitive, one per light (at `position`, shining along `direction`).
+pub fn scene(materials: Vec<Material>, primitives: Vec<Primitive>, lights: &[(Light, Vec3, Vec3)]) -> Scene {
+    let mut scene = Scene { name: "test".into(), materials, ..Scene::default() };
+    for primitive in primitives {
+        scene.nodes.push(Node { mesh: Some(scene.meshes.len() as u32), ..Node::default() });
+        scene.meshes.push(Mesh { primitives: vec![primitive], ..Mesh::default() });
+    }
+    for (light, position, direction) in lights {
+        let rotation = glam::Quat::from_rotation_arc(Vec3::NEG_Z, direction.normalize());
+        let transform = Transform::Trs { translation: *position, rotation, scale: Vec3::ONE };
+        scene.nodes.push(Node { transform, light: Some(scene.lights.len() as u32), ..Node::default() });
+        scene.lights.push(light.clone());
+    }
+    scene
+}
+
+/// A punctual light of white light.
+pub fn light(kind: LightKind, intensity: f32) -> Light {
+    Light { name: "light".into(), kind, intensity: Vec3::splat(intensity), range: None }
+}
