@@ -8,7 +8,7 @@
 //! | [`profile`] | the `--profile` JSON file |
 //! | [`trace`] | the `--trace` file for Perfetto and `chrome://tracing` |
 //! | [`table`] | the table of passes printed at exit |
-//! | [`write`] | files written whole or not at all |
+//! | [`mod@write`] | files written whole or not at all |
 //!
 //! Nothing here touches the GPU: timings arrive as plain [`profile::PassRecord`]s.
 

@@ -30,10 +30,7 @@ pub fn write_whole<E: From<FileError>>(
 ) -> Result<(), E> {
     let fail = |source| FileError::new("write", path, source);
     let target = writable_target(path).map_err(fail)?;
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(&target);
 
     let mut builder = tempfile::Builder::new();
     builder.prefix(".linklight-").suffix(".part");
@@ -65,10 +62,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let fail = |source| FileError::new("write", path, source);
     let target = writable_target(path).map_err(fail)?;
-    let folder = match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(&target);
     match std::fs::metadata(folder) {
         Ok(metadata) if metadata.is_dir() => Ok(()),
         Ok(_) => Err(fail(io::Error::new(io::ErrorKind::NotADirectory, "its parent is not a folder"))),
@@ -77,6 +71,10 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
             format!("the folder {} does not exist; create it first", folder.display()),
         ))),
     }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 fn writable_target(path: &Path) -> io::Result<PathBuf> {
