@@ -113,11 +113,12 @@ fn help_and_version_are_no_errors() {
 #[test]
 fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
     let render = ["render", "a.glb", "-o", "a.png"];
-    let cases: [(&[&str], &str); 21] = [
+    let cases: [(&[&str], &str); 22] = [
         (&["paint"], "unrecognized subcommand"),
         (&["diff", "a.png"], "<B>"),
         (&["render", "a.glb"], "--output"),
         (&["render", "a.obj", "-o", "a.png"], "a scene is a .gltf or .glb file, or builtin:NAME"),
+        (&["render", "builtin:nowhere", "-o", "a.png"], "there is no built-in scene 'nowhere'; choose one of: "),
         (&["render", "a.glb", "-o", "a.jpg"], "the name must end in .exr or .png"),
         (&["--quiet", "-v", "methods"], "cannot be used with"),
         (&["diff", "a.png", "b.png", "--fail-above", "mse=1"], "did you mean"),
@@ -130,7 +131,7 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
         (&["--set", "rays=9"], "did you mean"),
         (&["--set", "rays_per_element=9"], "a whole number from 16 to 4096"),
         (&["--size", "0x10"], "a side is 1 to 16384 pixels"),
-        (&["--env", "1,2"], "three numbers R,G,B"),
+        (&["--env", "1,2"], "three numbers"),
         (&["--spp", "4"], "applies to path-tracing only"),
         (&["--exposure", "nan"], "a number from -32 to 32 stops"),
         (&["--seconds", "-1"], "a number from 0 to"),

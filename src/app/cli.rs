@@ -8,11 +8,12 @@ use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 use super::console::Verbosity;
 use super::diff::Limit;
 use super::values::{
-    CameraChoice, Environment, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_method, parse_size,
+    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_method, parse_size,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
 use crate::report::tonemap::Operator;
+use crate::scene::environment::load::EnvironmentSource;
 
 /// Renders glTF scenes by published finite-element global-illumination methods beside a path-traced reference
 #[derive(Debug, Parser)]
@@ -100,7 +101,7 @@ pub struct RenderArgs {
     pub camera: Option<CameraChoice>,
     /// Environment: an equirectangular .hdr/.exr picture, or one radiance for all directions [default: none]
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
-    pub env: Option<Environment>,
+    pub env: Option<EnvironmentSource>,
     /// Leave out specular reflection: every surface is Lambertian with its base colour
     #[arg(long)]
     pub diffuse: bool,

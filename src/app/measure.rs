@@ -51,3 +51,42 @@ pub fn memory(owners: &BTreeMap<String, gpu::MemoryUse>) -> Memory {
 pub fn clock(context: &gpu::Context, time_line: &TimeLine) -> Clock {
     time_line.calibrate(|| context.calibrate().map(|pair| (pair.device_ns, pair.max_deviation_ns)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_keep_every_figure() {
+        let record = gpu::PassRecord {
+            path: "frame/gather/links".into(),
+            name: "gather/links",
+            start_ns: 5,
+            end_ns: 9,
+            bytes_read: 3,
+            bytes_written: 4,
+            counters: vec![("threads", 64)],
+            overlapped: true,
+        };
+        let converted = pass_records(vec![record]);
+        let expected = PassRecord {
+            path: "frame/gather/links".into(),
+            name: "gather/links".into(),
+            start_ns: 5,
+            end_ns: 9,
+            bytes_read: 3,
+            bytes_written: 4,
+            counters: vec![("threads".into(), 64)],
+            overlapped: true,
+        };
+        assert_eq!(converted, [expected]);
+    }
+
+    #[test]
+    fn memory_sums_its_owners() {
+        let used = |current_bytes, peak_bytes| gpu::MemoryUse { current_bytes, peak_bytes };
+        let owners = BTreeMap::from([("bvh".to_owned(), used(1, 10)), ("links".to_owned(), used(2, 20))]);
+        let memory = memory(&owners);
+        assert_eq!((memory.bytes, memory.peak_bytes, memory.owners.len()), (3, 30, 2));
+    }
+}

@@ -17,6 +17,7 @@ mod error;
 pub mod interrupt;
 pub mod measure;
 pub mod methods;
+pub mod output;
 pub mod render;
 pub mod values;
 
@@ -30,7 +31,8 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
     match cli.command {
         cli::Command::Render(args) => {
             let request = render::RenderRequest::try_from(*args)?;
-            render::run(&request, &cli.global, &console, out)
+            let interrupt = interrupt::Interrupt::install();
+            render::run(&request, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
         cli::Command::Devices(args) => devices::run(&args, &cli.global, out),

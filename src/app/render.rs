@@ -8,12 +8,14 @@ use serde_json::{Map, Value, json};
 use super::AppError;
 use super::cli::{Channel, Display, Global, RenderArgs};
 use super::console::Console;
-use super::values::{CameraChoice, Environment, Format, Output, SceneSource};
+use super::interrupt::Interrupt;
+use super::values::{CameraChoice, Format, Output, SceneSource};
 use crate::gpu::{Context, Options};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
 use crate::report::tonemap::ToneSettings;
 use crate::report::write::check_writable;
+use crate::scene::environment::load::EnvironmentSource;
 
 const DEFAULT_SPP: u32 = 64;
 
@@ -38,7 +40,7 @@ pub struct RenderRequest {
     pub frames: u32,
     /// `None` takes the first of the scene, else one framed on its bounds.
     pub camera: Option<CameraChoice>,
-    pub environment: Option<Environment>,
+    pub environment: Option<EnvironmentSource>,
     /// Specular reflection is left out.
     pub diffuse: bool,
     pub light: LightParts,
@@ -143,8 +145,8 @@ impl RenderRequest {
     pub fn record(&self) -> Result<Map<String, Value>, AppError> {
         let camera = self.camera.as_ref().map(|camera| camera.name.as_str());
         let environment = self.environment.as_ref().map(|environment| match environment {
-            Environment::File(path) => json!(path.display().to_string()),
-            Environment::Constant(radiance) => json!(radiance.to_array().map(|value| value.to_json())),
+            EnvironmentSource::File(path) => json!(path.display().to_string()),
+            EnvironmentSource::Constant(radiance) => json!(radiance.to_array().map(|value| value.to_json())),
         });
         let mut record = Map::new();
         let mut insert = |name: &str, value: Value| record.insert(name.to_owned(), value);
@@ -183,9 +185,16 @@ impl LightParts {
 }
 
 /// Render and write what was asked for.
-pub fn run(request: &RenderRequest, global: &Global, _console: &Console, _out: &mut dyn Write) -> Result<(), AppError> {
+pub fn run(
+    request: &RenderRequest,
+    global: &Global,
+    _console: &Console,
+    interrupt: &Interrupt,
+    _out: &mut dyn Write,
+) -> Result<(), AppError> {
     let options = Options { gpu: global.gpu.clone(), validation: global.validate, ..Options::default() };
     let context = Context::new(options)?;
+    interrupt.check()?;
     let device = &context.info().name;
     Err(AppError::failed(format!("{device} is ready, but no method renders {:?} yet", request.scene)))
 }
@@ -231,7 +240,7 @@ mod tests {
         assert_eq!((request.spp, request.bounces, request.width, request.height), (9, 0, 8, 6));
         assert_eq!((request.seconds, request.frames, request.seed), (1.5, 3, 7));
         assert_eq!(request.camera.as_ref().unwrap().index, Some(2));
-        assert_eq!(request.environment, Some(Environment::Constant(glam::Vec3::new(0.1, 0.0, 2.0))));
+        assert_eq!(request.environment, Some(EnvironmentSource::Constant(glam::Vec3::new(0.1, 0.0, 2.0))));
         assert_eq!((request.diffuse, request.light, request.elements), (true, LightParts::DirectOnly, Some(5000)));
         assert_eq!(request.tone.exposure, -1.0);
         assert_eq!(request.channels, [Channel::Direct, Channel::Depth]);

@@ -3,18 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use glam::Vec3;
-
 use crate::methods::settings::suggest;
 use crate::methods::{self, METHODS, Method};
 use crate::report::image::{MAX_PIXELS, MAX_SIDE};
+use crate::scene::builtin;
 
 /// Where a scene comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SceneSource {
     /// A .gltf or .glb file.
     File(PathBuf),
-    /// The name after `builtin:`.
+    /// The name after `builtin:`, known to exist.
     Builtin(String),
 }
 
@@ -22,12 +21,9 @@ impl FromStr for SceneSource {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(name) = text.strip_prefix("builtin:") {
-            return if name.is_empty() {
-                Err("a name must follow builtin:".to_owned())
-            } else {
-                Ok(Self::Builtin(name.to_owned()))
-            };
+        if let Some(name) = text.strip_prefix(builtin::PREFIX) {
+            builtin::resolve(name).map_err(|error| error.to_string())?;
+            return Ok(Self::Builtin(name.to_owned()));
         }
         match extension(Path::new(text)).as_str() {
             "gltf" | "glb" => Ok(Self::File(text.into())),
@@ -80,37 +76,6 @@ impl FromStr for CameraChoice {
             return Err("a name or an index was expected".to_owned());
         }
         Ok(Self { name: text.to_owned(), index: text.parse().ok() })
-    }
-}
-
-/// Light from infinitely far away.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Environment {
-    /// An equirectangular picture of radiance.
-    File(PathBuf),
-    /// The same radiance from everywhere, W m^-2 sr^-1, linear RGB.
-    Constant(Vec3),
-}
-
-impl FromStr for Environment {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if matches!(extension(Path::new(text)).as_str(), "hdr" | "exr") {
-            return Ok(Self::File(text.into()));
-        }
-        let numbers: Result<Vec<f32>, _> = text.split(',').map(|number| number.trim().parse::<f32>()).collect();
-        match numbers.as_deref() {
-            Ok([red, green, blue]) => {
-                let radiance = Vec3::new(*red, *green, *blue);
-                if radiance.is_finite() && radiance.min_element() >= 0.0 {
-                    Ok(Self::Constant(radiance))
-                } else {
-                    Err("radiance must be finite and not negative".to_owned())
-                }
-            }
-            _ => Err("expected a .hdr or .exr file, or three numbers R,G,B".to_owned()),
-        }
     }
 }
 
@@ -184,19 +149,10 @@ mod tests {
     }
 
     #[test]
-    fn environments() {
-        assert_eq!("sky.HDR".parse(), Ok(Environment::File("sky.HDR".into())));
-        assert_eq!("0, 0.5,1e1".parse(), Ok(Environment::Constant(Vec3::new(0.0, 0.5, 10.0))));
-        for bad in ["", "1,2", "1,2,3,4", "1,2,x", "-1,0,0", "nan,0,0", "inf,0,0", "sky.png"] {
-            assert!(bad.parse::<Environment>().is_err(), "{bad:?}");
-        }
-    }
-
-    #[test]
     fn scenes_outputs_and_cameras() {
         assert_eq!("a/b.GLB".parse(), Ok(SceneSource::File("a/b.GLB".into())));
-        assert_eq!("builtin:office".parse(), Ok(SceneSource::Builtin("office".into())));
-        for bad in ["", "a", "a.obj", "builtin:", "builtin"] {
+        assert_eq!("builtin:cornell-box".parse(), Ok(SceneSource::Builtin("cornell-box".into())));
+        for bad in ["", "a", "a.obj", "builtin:", "builtin", "builtin:cornel-box"] {
             assert!(bad.parse::<SceneSource>().is_err(), "{bad:?}");
         }
         assert_eq!("x.PNG".parse::<Output>().unwrap().format, Format::Png);

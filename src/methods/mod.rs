@@ -1,6 +1,7 @@
 //! The methods, one module per paper, all with the same headings; and the papers this program cites.
 //!
-//! [`METHODS`] is the table of contents. Comments cite as `[Key section, Eq. n]`; the Keys are in [`PAPERS`].
+//! [`METHODS`] is the table of contents. Comments cite as `[Key section, Eq. n]`; the Keys are in [`PAPERS`]. Where a
+//! bare `[Key]` stands in documentation, a last line `[Key]: crate::methods::PAPERS` makes it a link.
 
 pub mod explicit_visibility;
 pub mod path_tracing;

@@ -13,6 +13,8 @@
 //!
 //! Everything is measured on linear radiance except FLIP. Sums are f64. A NaN or infinite pixel is an error with its
 //! place, never part of a mean.
+//!
+//! [Andersson2020]: crate::methods::PAPERS
 
 use glam::Vec3;
 use serde::Serialize;
@@ -42,6 +44,8 @@ pub struct ErrorFigures {
     ///
     /// Differs from [Wang2004]: radiance has no fixed range, so L is the 95th percentile of the reference's luminance
     /// (its maximum where that is zero); windows at borders and masked pixels renormalise their weights.
+    ///
+    /// [Wang2004]: crate::methods::PAPERS
     pub ssim: f64,
     /// Mean FLIP error, 0..=1, at 67 pixels a degree.
     pub flip_mean: f64,

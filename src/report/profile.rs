@@ -23,7 +23,7 @@
 //! | `passes[].counters` | object: sum over calls, by name (`links made`, `nodes visited` ...) |
 //! | `passes[].overlapped` | `true` if any call ran beside another pass: its times share the GPU |
 //! | `total_ms` | sum of all passes, milliseconds |
-//! | `memory` | `{bytes, peak_bytes, owners: [{owner, bytes, peak_bytes}]}`: GPU memory, largest peak first |
+//! | `memory` | `{bytes, peak_bytes, owners: [{owner, bytes, peak_bytes}]}`: GPU memory, largest peak first; the total peak is the sum of the owners', an upper bound |
 //!
 //! The structs below are the schema: they are written and read by the same declarations. Nothing here measures.
 

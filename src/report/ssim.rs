@@ -1,4 +1,6 @@
 //! Mean structural similarity of two planes [Wang2004], with weights so that masked pixels and borders take no part.
+//!
+//! [Wang2004]: crate::methods::PAPERS
 
 use rayon::prelude::*;
 

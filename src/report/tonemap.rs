@@ -11,6 +11,8 @@
 //!
 //! `reinhard` and `filmic` first bring the picture's log-average luminance to `key` [Reinhard2002, Eq. 1, 2], so that
 //! a scene in any unit shows; `none` leaves radiance as it is, for pictures that are to be compared by eye.
+//!
+//! [Hable2010]: crate::methods::PAPERS
 
 use glam::Vec3;
 
@@ -125,6 +127,8 @@ pub fn luminance(rgb: Vec3) -> f32 {
 ///
 /// Differs from [Reinhard2002]: black and non-finite pixels are left out and luminance is floored at 1e-4 of its
 /// mean, so that a black background does not drive the average to zero (their small delta does not prevent that).
+///
+/// [Reinhard2002]: crate::methods::PAPERS
 pub fn log_average_luminance(rgb: &[Vec3]) -> f32 {
     let lit =
         || rgb.iter().filter(|pixel| pixel.is_finite()).map(|pixel| f64::from(luminance(*pixel))).filter(|l| *l > 0.0);

@@ -1,4 +1,6 @@
 //! Explicit visibility [Schmitz2008]: light travels along vertex-to-vertex links found by casting rays.
+//!
+//! [Schmitz2008]: crate::methods::PAPERS
 
 crate::settings! {
     /// What explicit visibility lets the user choose.

@@ -1,5 +1,8 @@
 //! The reference [Kajiya1986]: unidirectional paths with next-event estimation and multiple importance sampling
 //! [Veach1995].
+//!
+//! [Kajiya1986]: crate::methods::PAPERS
+//! [Veach1995]: crate::methods::PAPERS
 
 crate::choice! {
     /// How next-event estimation picks an emissive triangle.

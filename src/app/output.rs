@@ -1,0 +1,86 @@
+//! What a render leaves behind: the picture with its metadata, the profile, the trace, the table of passes.
+
+use std::io::Write;
+
+use serde_json::{Map, Value, json};
+
+use super::AppError;
+use super::measure;
+use super::render::RenderRequest;
+use super::values::{Format, SceneSource};
+use crate::gpu;
+use crate::report::image::{self, Metadata, Picture};
+use crate::report::profile::{Profile, SceneFacts};
+use crate::report::table;
+use crate::report::trace::{self, TimeLine};
+
+/// Write the picture as the request asks: radiance and channels as .exr, tone-mapped as .png. The settings, the scene
+/// and the device are stored in it.
+pub fn write_picture(request: &RenderRequest, mut picture: Picture, device: &gpu::DeviceInfo) -> Result<(), AppError> {
+    picture.metadata = metadata(request, device)?;
+    let bad = picture.rgb.iter().filter(|pixel| !pixel.is_finite()).count();
+    if bad > 0 {
+        tracing::warn!("{bad} of {} pixels are NaN or infinite (magenta in a .png)", picture.rgb.len());
+    }
+    let path = &request.output.path;
+    match request.output.format {
+        Format::Exr => image::write_exr(path, &picture)?,
+        Format::Png => {
+            let shown = request.tone.fit(&picture.rgb).to_bytes(&picture.rgb);
+            image::write_png(path, picture.width, picture.height, &shown.bytes, &picture.metadata)?;
+        }
+    }
+    Ok(())
+}
+
+/// What a run measured.
+pub struct Measured<'a> {
+    pub context: &'a gpu::Context,
+    pub time_line: &'a TimeLine,
+    /// Passes of the measured frames, in submission order.
+    pub records: Vec<gpu::PassRecord>,
+    pub scene: SceneFacts,
+}
+
+/// Write the profile and the trace that were asked for, and print the table of passes to `out`.
+pub fn write_measurements(
+    request: &RenderRequest,
+    measured: Measured<'_>,
+    out: &mut dyn Write,
+) -> Result<(), AppError> {
+    let clock = measure::clock(measured.context, measured.time_line);
+    let records = measure::pass_records(measured.records);
+    let device = measure::device(measured.context.info());
+    let memory = measure::memory(&measured.context.memory_by_owner());
+    let settings = request.record()?;
+    if let Some(path) = &request.trace {
+        let about: Map<String, Value> = [
+            ("device".to_owned(), serde_json::to_value(&device)?),
+            ("scene".to_owned(), serde_json::to_value(&measured.scene)?),
+            ("settings".to_owned(), settings.clone().into()),
+        ]
+        .into_iter()
+        .collect();
+        trace::write(path, &measured.time_line.spans(), &records, clock, &about)?;
+    }
+    let profile = Profile::new(device, measured.scene, settings, request.frames, &records, memory);
+    if let Some(path) = &request.profile {
+        profile.write(path)?;
+    }
+    write!(out, "{}", table::render(&profile.passes))?;
+    Ok(())
+}
+
+fn metadata(request: &RenderRequest, device: &gpu::DeviceInfo) -> Result<Metadata, AppError> {
+    let scene = match &request.scene {
+        SceneSource::File(path) => path.display().to_string(),
+        SceneSource::Builtin(name) => format!("builtin:{name}"),
+    };
+    let facts = [
+        ("Software", format!("linklight {}", env!("CARGO_PKG_VERSION"))),
+        ("scene", scene),
+        ("device", format!("{} ({})", device.name, device.driver)),
+        ("settings", json!(request.record()?).to_string()),
+    ];
+    Ok(facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+}
