@@ -1,0 +1,7 @@
+//! The hierarchy and ray casting: structure, refit, agreement with brute force, watertightness, bad input.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod meshes;
+mod structure;
+mod trace;
