@@ -1,6 +1,5 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/ray.glsl"
 #include "lib/bvh.glsl"
 
 // One thread per node of a level: the bounds of its children, and the cost of its subtree.

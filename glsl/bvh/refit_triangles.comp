@@ -1,6 +1,5 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/ray.glsl"
 #include "lib/bvh.glsl"
 
 // One thread per triangle: moves its corners to where the vertices are.

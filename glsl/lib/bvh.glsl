@@ -1,7 +1,11 @@
+#ifndef LIB_BVH
+#define LIB_BVH
 // The bounding volume hierarchy and the one traversal loop. The kernel binds the tables and defines the bridge:
 //     BvhNode bvh_node(uint node)                         nodes[node]
 //     BvhTriangle bvh_triangle(uint slot)                 triangles in leaf order
 //     bool is_hole(uint triangle, vec2 barycentrics)      true where an alpha mask lets the ray pass
+
+#include "lib/ray.glsl"
 
 // Bounds of up to four children, side by side.
 struct BvhNode {
@@ -144,3 +148,4 @@ Hit traverse(Ray ray, bool any)
         entry = stack[--depth];
     }
 }
+#endif

@@ -1,3 +1,5 @@
+#ifndef LIB_RAY
+#define LIB_RAY
 // Rays and what they hit: the currency of everything that traces.
 
 // The points origin + t direction with t_min <= t <= t_max; t is in units of the direction's length (metres where it
@@ -35,3 +37,4 @@ bool is_active(Ray ray)
     return ray.t_max >= 0 && ray.t_min <= ray.t_max && length_squared > 1e-20 && length_squared < 1e20
            && max(origin.x, max(origin.y, origin.z)) <= 1e15 && dot(origin, vec3(1)) < 1e16;
 }
+#endif

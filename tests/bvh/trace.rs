@@ -109,7 +109,7 @@ fn rays_from_inside(mesh: &Mesh, count: usize, random: &mut Random) -> Vec<Ray> 
         let origin = match rays.len() % 4 {
             0 => Vec3::ZERO,
             // Exact coordinates make rays that lie in planes of edges.
-            1 => Vec3::from([0; 3].map(|_: i32| random.below(5) as f32 * 0.25 - 0.5)),
+            1 => Vec3::from([0; 3].map(|_: i32| random.below(5) as f32 * 0.125 - 0.25)),
             _ => 0.35 * point(random),
         };
         let corners = mesh.triangles[random.below(mesh.triangles.len() as u32) as usize];
