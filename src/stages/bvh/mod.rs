@@ -147,8 +147,8 @@ impl Bvh {
 
     /// True when refitting has made the expected cost of a ray grow beyond `growth` (1.5, say) times that of the build.
     pub fn needs_rebuild(&self, context: &Context, growth: f32) -> Result<bool, BvhError> {
-        // Not `>`: a cost that is no number is no good either.
-        Ok(!(self.sah_cost(context)? <= growth * self.built_cost))
+        let cost = self.sah_cost(context)?;
+        Ok(cost.is_nan() || cost > growth * self.built_cost)
     }
 
     /// Builds anew over the present positions and takes the place of the old tree.
@@ -185,7 +185,7 @@ fn check(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), BvhError> {
     if triangles.len() > topology::MAX_TRIANGLES {
         return Err(BvhError::TriangleCount { count: triangles.len() });
     }
-    let outside = |p: &Vec3| !(p.abs().max_element() <= COORDINATE_LIMIT && p.is_finite());
+    let outside = |p: &Vec3| !p.is_finite() || p.abs().max_element() > COORDINATE_LIMIT;
     if let Some(vertex) = positions.par_iter().position_first(outside) {
         return Err(BvhError::Coordinate { vertex, position: positions[vertex] });
     }
