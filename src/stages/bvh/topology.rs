@@ -106,7 +106,7 @@ fn balanced(triangles: &[Triangle]) -> Topology {
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
     let mut topology = Topology { children: Vec::new(), slots: Vec::new(), level_first: vec![0] };
     // Ranges of `order`, one per node of the present level.
-    let mut level = vec![0..order.len()];
+    let mut level = Vec::from([std::ops::Range { start: 0, end: order.len() }]);
     while !level.is_empty() {
         let below_first = (topology.children.len() + level.len()) as u32;
         let mut below = Vec::new();
