@@ -162,6 +162,15 @@ impl<'d> Accessor<'d> {
         }
     }
 
+    /// Checks that reading `count` elements is not had for free: see [`MAX_UNBACKED_ELEMENTS`].
+    pub fn check_backed(&self, count: usize) -> Result<(), Fault> {
+        if self.base.is_none() && count > MAX_UNBACKED_ELEMENTS {
+            let rule = format!("at most {MAX_UNBACKED_ELEMENTS} elements without bufferView can be read");
+            return Err(Fault::invalid(&self.pointer, rule, count));
+        }
+        Ok(())
+    }
+
     /// Reads elements as floats, normalised integers mapped to their range. `N` is the shape's component count at
     /// most; further components are left out. Fails on NaN and infinity.
     pub fn read<const N: usize, T>(
@@ -213,10 +222,7 @@ impl<'d> Accessor<'d> {
             Selection::These(indices) => indices.len(),
         };
         document.budget.reserve_array::<T>(len as u64, || format!("the {len} elements of {}", self.pointer))?;
-        if self.base.is_none() && len > MAX_UNBACKED_ELEMENTS {
-            let rule = format!("at most {MAX_UNBACKED_ELEMENTS} elements without bufferView can be read");
-            return Err(Fault::invalid(&self.pointer, rule, len));
-        }
+        self.check_backed(len)?;
         values.reserve_exact(len);
         for position in 0..len {
             let index = match selection {

@@ -8,7 +8,7 @@ use super::mesh::{self, Repairs, Wanted};
 use super::node::{self, Tree};
 use super::texture::Textures;
 use super::{animation, camera, light, material, skin};
-use crate::scene::{Material, Node, Scene, Transform};
+use crate::scene::{Material, Mesh, Node, Scene, Transform};
 use glam::{Quat, Vec3};
 
 /// Reads the chosen scene and all that it uses.
@@ -54,12 +54,14 @@ pub fn scene(document: &Document, choice: Option<&SceneChoice>) -> Result<Scene,
             ..Node::default()
         });
     }
+    let joints = |mesh: &Mesh| mesh.primitives.iter().flat_map(|primitive| &primitive.joints).flatten().max().copied();
+    let largest_joint: Vec<Option<u16>> = scene.meshes.iter().map(joints).collect();
     for (index, object) in shown.iter().enumerate() {
         scene.nodes[index].mesh = meshes.of(object.index("mesh", "meshes", lists.meshes.len())?);
         scene.nodes[index].camera = cameras.of(object.index("camera", "cameras", lists.cameras.len())?);
         scene.nodes[index].light = lights.of(light::of_node(object, &lists.lights)?);
         let skin = skins.of(object.index("skin", "skins", lists.skins.len())?);
-        bind_skin(document, &mut scene, index, skin, object)?;
+        bind_skin(document, &mut scene, index, &largest_joint, skin, object)?;
         read_morph_weights(&mut scene, index, object)?;
     }
     read_clips(document, &mut scene, &tree)?;
@@ -155,24 +157,22 @@ fn read_materials(document: &Document, lists: &Lists, meshes: &InUse, scene: &mu
     Ok(MaterialMap { named, default })
 }
 
-/// Gives a node its skin, when its mesh has joints to bind and all of them exist.
+/// Gives a node its skin, when its mesh (whose largest joint is `largest_joint`) has joints and the skin has them all.
 fn bind_skin(
     document: &Document,
     scene: &mut Scene,
     node: usize,
+    largest_joint: &[Option<u16>],
     skin: Option<u32>,
     object: &Object,
 ) -> Result<(), Fault> {
-    let (Some(skin), Some(mesh)) = (skin, scene.nodes[node].mesh) else {
-        return Ok(());
-    };
-    let joints = scene.meshes[mesh as usize].primitives.iter().flat_map(|primitive| &primitive.joints);
-    let Some(largest) = joints.flatten().max() else {
+    let (Some(skin), Some(mesh)) = (skin, scene.nodes[node].mesh) else { return Ok(()) };
+    let Some(largest) = largest_joint[mesh as usize] else {
         document.notes.say("A skin has no effect on a mesh without joints and weights.");
         return Ok(());
     };
     let joint_count = scene.skins[skin as usize].joints.len();
-    if usize::from(*largest) >= joint_count {
+    if usize::from(largest) >= joint_count {
         let rule = format!("must have a joint for each that its mesh names (up to {largest})");
         return Err(Fault::invalid(object.at("skin"), rule, format!("a skin of {joint_count} joints")));
     }

@@ -13,7 +13,7 @@ use std::io::Cursor;
 /// As notes call it.
 const PART: &str = "A texture image";
 
-/// An image whose header has been read and whose memory has been counted.
+/// An image whose header has been read and whose pixels have been counted.
 struct Encoded<'d> {
     name: String,
     pointer: String,
@@ -21,6 +21,7 @@ struct Encoded<'d> {
     format: ImageFormat,
     width: u32,
     height: u32,
+    /// What decoding takes beside the result.
     working_bytes: u64,
 }
 
@@ -28,42 +29,45 @@ struct Encoded<'d> {
 /// note, as a picture without one texture is better than none; what breaks the budget or a rule of safety is an error.
 pub fn decode(document: &Document, wanted: &[(usize, bool)]) -> Result<Vec<Option<Image>>, Fault> {
     let images = document.list("images")?;
-    let mut encoded = BTreeMap::new();
+    let mut uses: BTreeMap<usize, u64> = BTreeMap::new();
     for (index, _) in wanted {
-        if !encoded.contains_key(index) {
-            let uses = wanted.iter().filter(|(other, _)| other == index).count() as u64;
-            let opened = document.tolerate(PART, open(document, &images.object(*index)?, uses))?;
-            encoded.insert(*index, opened);
-        }
+        *uses.entry(*index).or_default() += 1;
+    }
+    let mut jobs = Vec::new();
+    for (index, uses) in &uses {
+        let encoded = document.tolerate(PART, open(document, &images.object(*index)?, *uses))?;
+        jobs.extend(encoded.map(|encoded| (*index, encoded)));
     }
 
-    let jobs: Vec<_> = encoded.into_iter().filter_map(|(index, encoded)| Some((index, encoded?))).collect();
+    // No more images are in work at a time than there are threads.
+    let mut working: Vec<u64> = jobs.iter().map(|(_, encoded)| encoded.working_bytes).collect();
+    working.sort_unstable_by(|a, b| b.cmp(a));
+    let at_a_time =
+        working.iter().take(rayon::current_num_threads()).fold(0, |sum: u64, bytes| sum.saturating_add(*bytes));
+    document.budget.reserve(at_a_time, || "decoding the images".into())?;
     let decoded: Vec<_> = jobs.par_iter().map(|(index, encoded)| (*index, encoded.decode())).collect();
+    document.budget.release(at_a_time);
+
     let mut by_index = BTreeMap::new();
     for (index, result) in decoded {
-        if let Some(image) = document.tolerate(PART, result)? {
-            by_index.insert(index, image);
-        }
+        by_index.extend(document.tolerate(PART, result)?.map(|image| (index, image)));
     }
-    for (_, encoded) in jobs {
-        document.budget.release(encoded.working_bytes);
-    }
-
-    let with_use =
-        |(index, srgb): &(usize, bool)| by_index.get(index).map(|image| Image { srgb: *srgb, ..image.clone() });
-    Ok(wanted.iter().map(with_use).collect())
+    let mut take = |index: &usize, srgb: bool| {
+        let left = uses.get_mut(index)?;
+        *left -= 1;
+        // The last use takes the pixels, earlier ones copy them.
+        let image = if *left == 0 { by_index.remove(index) } else { by_index.get(index).cloned() };
+        image.map(|image| Image { srgb, ..image })
+    };
+    Ok(wanted.iter().map(|(index, srgb)| take(index, *srgb)).collect())
 }
 
-/// Finds the image's bytes, reads its header, and counts what decoding it and keeping it `uses` times will take.
+/// Finds the image's bytes, reads its header, and counts what keeping it `uses` times will take.
 fn open<'d>(document: &'d Document, image: &Object, uses: u64) -> Result<Encoded<'d>, Fault> {
     let pointer = image.pointer().to_owned();
-    let (bytes, held_bytes) = match (image.text("uri")?, image.has("bufferView")) {
-        (Some(uri), false) => {
-            let bytes = document.read_uri(uri, &image.at("uri"))?;
-            let held_bytes = bytes.len() as u64;
-            (Cow::Owned(bytes), held_bytes)
-        }
-        (None, true) => (Cow::Borrowed(document.view(image, "bufferView")?.bytes), 0),
+    let bytes = match (image.text("uri")?, image.has("bufferView")) {
+        (Some(uri), false) => Cow::Owned(document.read_uri(uri, &image.at("uri"))?),
+        (None, true) => Cow::Borrowed(document.view(image, "bufferView")?.bytes),
         (uri, _) => {
             let seen = if uri.is_some() { "both" } else { "neither" };
             return Err(Fault::invalid(pointer, "must have either uri or bufferView", seen));
@@ -92,12 +96,10 @@ fn open<'d>(document: &'d Document, image: &Object, uses: u64) -> Result<Encoded
         return Err(Fault::invalid(pointer, rule, format!("{width} x {height}")));
     }
     let pixels = u64::from(width) * u64::from(height);
-    let what = || format!("the {width} x {height} image {pointer}");
-    document.budget.reserve(pixels * 4 * uses, what)?;
+    document.budget.reserve(pixels * 4 * uses, || format!("the {width} x {height} image {pointer}"))?;
     // A progressive JPEG holds the coefficients of all its scans, two bytes a sample, beside what it decodes to.
     let coefficient_bytes = if format == ImageFormat::Jpeg { pixels * 6 } else { 0 };
-    let working_bytes = decoded_bytes.saturating_add(coefficient_bytes).saturating_add(held_bytes);
-    document.budget.reserve(working_bytes.saturating_sub(held_bytes), || format!("decoding {}", what()))?;
+    let working_bytes = decoded_bytes.saturating_add(coefficient_bytes);
     let name = match image.name() {
         name if name.is_empty() => image.text("uri")?.filter(|uri| !uri.starts_with("data:")).unwrap_or("").into(),
         name => name,

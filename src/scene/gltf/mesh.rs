@@ -131,7 +131,7 @@ impl<'a> Reader<'_, 'a> {
         };
         positions.expect("POSITION", &["VEC3"], &POSITION)?;
         let vertex_count = positions.count;
-        let mut triangles = self.read_triangles(mode, vertex_count)?;
+        let mut triangles = self.read_triangles(mode, &positions)?;
 
         // Where nothing bends the shape, a triangle without area stays one; else it may open.
         let has_joints = attributes.has("JOINTS_0");
@@ -160,13 +160,23 @@ impl<'a> Reader<'_, 'a> {
         Ok(Some(primitive))
     }
 
-    fn read_triangles(&self, mode: Mode, vertex_count: usize) -> Result<Vec<[u32; 3]>, Fault> {
+    fn read_triangles(&self, mode: Mode, positions: &Accessor) -> Result<Vec<[u32; 3]>, Fault> {
         let indices = Accessor::open(self.document, self.object, "indices")?;
+        let vertex_count = positions.count;
         let corner_count = indices.as_ref().map_or(vertex_count, |indices| indices.count);
         let triangle_count = mode.triangle_count(corner_count) as u64;
         let pointer = self.object.pointer();
+        // Each corner can become a vertex of its own, and vertices are numbered in 32 bits.
+        if triangle_count * 3 >= u64::from(u32::MAX) {
+            return Err(Fault::invalid(
+                pointer,
+                format!("must have less than {} triangles", u32::MAX / 3),
+                triangle_count,
+            ));
+        }
         self.document.budget.reserve_array::<[u32; 3]>(triangle_count, || format!("the triangles of {pointer}"))?;
         let Some(indices) = indices else {
+            positions.check_backed(corner_count)?;
             self.document.budget.reserve_array::<u32>(corner_count as u64, || format!("the corners of {pointer}"))?;
             return Ok(mode.triangles(&(0..vertex_count as u32).collect::<Vec<_>>()));
         };
@@ -246,7 +256,7 @@ impl<'a> Reader<'_, 'a> {
             self.document.notes.say("A normal map has no effect on a primitive without texture coordinates.");
             return Ok(());
         }
-        let bytes = surface::unsharing_bytes(primitive) + primitive.triangles.len() as u64 * 256;
+        let bytes = surface::unsharing_bytes(primitive) + primitive.triangles.len() as u64 * 512;
         budget.reserve(bytes, || format!("the tangents of {pointer}"))?;
         let transformed = |uv: &Vec2| {
             Vec2::from(texture.transform.map(|[a, b, c]| (a * uv.x + b * uv.y + c).clamp(f32::MIN, f32::MAX)))

@@ -1,7 +1,7 @@
 //! glTF 2.0 in: `.gltf` and `.glb` files, read into the plain types of [`crate::scene`].
 //!
-//! Every count, offset, index and number of the file is checked where it is read ([`json`], [`accessor`]); everything
-//! decoded is counted against a budget first ([`budget`]); whatever can be left out without changing what the scene is
+//! Every count, offset, index and number of the file is checked where it is read (`json`, `accessor`); everything
+//! decoded is counted against a budget first (`budget`); whatever can be left out without changing what the scene is
 //! (a missing texture, an unknown optional extension) is left out with a note. Only what the chosen scene uses is read.
 //!
 //! The JSON is read through checked accessors rather than through the `gltf` crate's types: those index without asking

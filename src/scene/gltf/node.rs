@@ -5,7 +5,7 @@ use super::document::Document;
 use super::error::{Fault, shown};
 use super::json::Object;
 use crate::scene::Transform;
-use glam::{Mat4, Quat, Vec3};
+use glam::{Mat4, Quat, Vec3, Vec4};
 
 /// The nodes of the chosen scene.
 #[derive(Debug)]
@@ -172,12 +172,11 @@ pub fn read_transform(document: &Document, node: &Object) -> Result<Transform, F
             document.notes.say("A node has both a matrix and translation, rotation or scale; the matrix was taken.");
         }
         let matrix = Mat4::from_cols_array(&columns);
-        let bottom = matrix.row(3).to_array();
-        if bottom != [0.0, 0.0, 0.0, 1.0] {
-            let seen = format!("{bottom:?} at the bottom");
+        if !matrix.row(3).abs_diff_eq(Vec4::W, 1e-4) {
+            let seen = format!("{} at the bottom", matrix.row(3));
             return Err(Fault::invalid(node.at("matrix"), "must be affine, its last row 0 0 0 1", seen));
         }
-        return Ok(Transform::Matrix(matrix));
+        return Ok(Transform::Matrix(affine(matrix)));
     }
     let translation = Vec3::from(node.numbers("translation")?.unwrap_or([0.0; 3]));
     let scale = Vec3::from(node.numbers("scale")?.unwrap_or([1.0; 3]));
@@ -194,4 +193,10 @@ pub fn unit_rotation(rotation: [f32; 4]) -> Option<Quat> {
     let [x, y, z, w] = rotation.map(f64::from);
     let length = (x * x + y * y + z * z + w * w).sqrt();
     (length > 0.0).then(|| Quat::from_array([x, y, z, w].map(|value| (value / length) as f32)))
+}
+
+/// The matrix with the last row that every affine one has.
+pub fn affine(mut matrix: Mat4) -> Mat4 {
+    (matrix.x_axis.w, matrix.y_axis.w, matrix.z_axis.w, matrix.w_axis.w) = (0.0, 0.0, 0.0, 1.0);
+    matrix
 }

@@ -4,9 +4,9 @@ use super::accessor::{Accessor, Component, Selection};
 use super::document::Document;
 use super::error::Fault;
 use super::json::Object;
-use super::node::Tree;
+use super::node::{Tree, affine};
 use crate::scene::Skin;
-use glam::Mat4;
+use glam::{Mat4, Vec4};
 
 /// Reads one skin, all joints of which are in `tree`.
 pub fn read(document: &Document, object: &Object, tree: &Tree) -> Result<Skin, Fault> {
@@ -34,18 +34,13 @@ pub fn read(document: &Document, object: &Object, tree: &Tree) -> Result<Skin, F
             let mut matrices = accessor.read(document, Selection::All, |columns| Mat4::from_cols_array(&columns))?;
             matrices.truncate(joints.len());
             for matrix in &mut matrices {
-                if matrix.row(3).to_array() != [0.0, 0.0, 0.0, 1.0] {
+                if !matrix.row(3).abs_diff_eq(Vec4::W, 1e-4) {
                     document.notes.say("The last row of an inverse bind matrix was taken as 0 0 0 1, as glTF asks.");
-                    *matrix = affine(*matrix);
                 }
+                *matrix = affine(*matrix);
             }
             matrices
         }
     };
     Ok(Skin { joints, inverse_bind })
-}
-
-fn affine(mut matrix: Mat4) -> Mat4 {
-    (matrix.x_axis.w, matrix.y_axis.w, matrix.z_axis.w, matrix.w_axis.w) = (0.0, 0.0, 0.0, 1.0);
-    matrix
 }

@@ -37,8 +37,8 @@ impl Mode {
 /// The distinct vertices of `triangles` in ascending order. All are below `vertex_count`.
 pub fn used_vertices(triangles: &[[u32; 3]], vertex_count: usize) -> Vec<u32> {
     let corners = triangles.as_flattened();
-    // A few triangles of a large shared buffer must not cost time in the size of the buffer.
-    if corners.len() < vertex_count / 64 {
+    // A few triangles of a large shared buffer must not cost time and memory in the size of the buffer.
+    if corners.len() < vertex_count / 8 {
         let mut used = corners.to_vec();
         used.sort_unstable();
         used.dedup();
