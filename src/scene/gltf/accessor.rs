@@ -162,11 +162,16 @@ impl<'d> Accessor<'d> {
         }
     }
 
+    /// Whether no bytes stand behind the accessor at all.
+    pub fn is_all_zero(&self) -> bool {
+        self.base.is_none() && self.sparse.is_none()
+    }
+
     /// Checks that reading `count` elements is not had for free: see [`MAX_UNBACKED_ELEMENTS`].
     pub fn check_backed(&self, count: usize) -> Result<(), Fault> {
         if self.base.is_none() && count > MAX_UNBACKED_ELEMENTS {
             let rule = format!("at most {MAX_UNBACKED_ELEMENTS} elements without bufferView can be read");
-            return Err(Fault::invalid(&self.pointer, rule, count));
+            return Err(Fault::too_large(&self.pointer, rule, count));
         }
         Ok(())
     }

@@ -152,7 +152,7 @@ pub fn check_extensions(root: &Object, notes: &Notes) -> Result<(), Fault> {
     let lacking: Vec<_> = required.iter().filter(|name| !SUPPORTED_EXTENSIONS.contains(name)).collect();
     if !lacking.is_empty() {
         let names = lacking.iter().take(8).map(|name| shown(name)).collect::<Vec<_>>().join(", ");
-        return Err(Fault::RequiredExtension { names, supported: SUPPORTED_EXTENSIONS.join(", ") });
+        return Err(Fault::required_extension(root.at("extensionsRequired"), names));
     }
     for name in root.list("extensionsUsed")?.texts()? {
         if !SUPPORTED_EXTENSIONS.contains(&name) {

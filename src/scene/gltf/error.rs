@@ -39,7 +39,7 @@ pub enum Fault {
     #[error(
         "/extensionsRequired: the file needs {names}, which is not supported; supported are {supported}; export it without"
     )]
-    RequiredExtension { names: String, supported: String },
+    RequiredExtension { pointer: String, names: String, supported: String },
 
     #[error("{pointer}: the URI {uri} is refused: {rule}; put the data beside the scene file, or embed it")]
     RefusedUri { pointer: String, uri: String, rule: &'static str },
@@ -49,6 +49,9 @@ pub enum Fault {
     )]
     OverBudget { what: String, needed: u64, available: u64 },
 
+    #[error("{pointer}: {rule}, but it is {seen}; make it smaller or split it")]
+    TooLarge { pointer: String, rule: String, seen: String },
+
     #[error("no scene {wanted}; the file has {available}")]
     NoSuchScene { wanted: String, available: String },
 }
@@ -56,6 +59,15 @@ pub enum Fault {
 impl Fault {
     pub(super) fn invalid(pointer: impl Into<String>, rule: impl Into<String>, seen: impl fmt::Display) -> Self {
         Self::Invalid { pointer: pointer.into(), rule: rule.into(), seen: seen.to_string() }
+    }
+
+    pub(super) fn required_extension(pointer: impl Into<String>, names: String) -> Self {
+        let supported = super::container::SUPPORTED_EXTENSIONS.join(", ");
+        Self::RequiredExtension { pointer: pointer.into(), names, supported }
+    }
+
+    pub(super) fn too_large(pointer: impl Into<String>, rule: impl Into<String>, seen: impl fmt::Display) -> Self {
+        Self::TooLarge { pointer: pointer.into(), rule: rule.into(), seen: seen.to_string() }
     }
 }
 

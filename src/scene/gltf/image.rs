@@ -93,7 +93,7 @@ fn open<'d>(document: &'d Document, image: &Object, uses: u64) -> Result<Encoded
     };
     if width == 0 || height == 0 || width > MAX_IMAGE_EXTENT || height > MAX_IMAGE_EXTENT {
         let rule = format!("must be from 1 to {MAX_IMAGE_EXTENT} pixels a side");
-        return Err(Fault::invalid(pointer, rule, format!("{width} x {height}")));
+        return Err(Fault::too_large(pointer, rule, format!("{width} x {height}")));
     }
     let pixels = u64::from(width) * u64::from(height);
     document.budget.reserve(pixels * 4 * uses, || format!("the {width} x {height} image {pointer}"))?;

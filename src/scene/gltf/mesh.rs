@@ -110,6 +110,9 @@ const FRACTION: [(Component, bool); 3] = [(F32, false), (U8, true), (U16, true)]
 const JOINTS: [(Component, bool); 2] = [(U8, false), (U16, false)];
 const INDICES: [(Component, bool); 3] = [(U8, false), (U16, false), (U32, false)];
 
+/// The extension that keeps vertices in a form of its own, beside which accessors may be empty shells.
+const COMPRESSION: &str = "KHR_draco_mesh_compression";
+
 impl<'a> Reader<'_, 'a> {
     /// `None` when there is nothing to draw, which is noted.
     fn read(&self, wanted: Wanted, repairs: &mut Repairs) -> Result<Option<Primitive>, Fault> {
@@ -130,6 +133,10 @@ impl<'a> Reader<'_, 'a> {
             return Ok(None);
         };
         positions.expect("POSITION", &["VEC3"], &POSITION)?;
+        // Some exporters leave out both the requirement and the uncompressed data that would make it optional.
+        if positions.is_all_zero() && self.object.extension(COMPRESSION)?.is_some() {
+            return Err(Fault::required_extension(self.object.pointer(), COMPRESSION.into()));
+        }
         let vertex_count = positions.count;
         let mut triangles = self.read_triangles(mode, &positions)?;
 
@@ -168,7 +175,7 @@ impl<'a> Reader<'_, 'a> {
         let pointer = self.object.pointer();
         // Each corner can become a vertex of its own, and vertices are numbered in 32 bits.
         if triangle_count * 3 >= u64::from(u32::MAX) {
-            return Err(Fault::invalid(
+            return Err(Fault::too_large(
                 pointer,
                 format!("must have less than {} triangles", u32::MAX / 3),
                 triangle_count,

@@ -2,34 +2,12 @@
 //!
 //! Runs over the shared scene collection, where there is one beside the checkout (or at `LINKLIGHT_SHARED`).
 
+use crate::support::{gltf_files, shared};
 use linklight::scene::{self, LoadOptions, Scene};
-use std::path::{Path, PathBuf};
-
-/// The shared test inputs; `None` (said on standard error) where there are none.
-fn shared(folder: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("LINKLIGHT_SHARED")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
-    let path = root.join(folder);
-    if !path.is_dir() {
-        eprintln!("skipped: {} does not exist (set LINKLIGHT_SHARED)", path.display());
-        return None;
-    }
-    Some(path)
-}
+use std::path::Path;
 
 fn load(path: &Path) -> Scene {
     scene::load(path, &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"))
-}
-
-fn gltf_files(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            gltf_files(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "gltf" || extension == "glb") {
-            found.push(path);
-        }
-    }
 }
 
 /// Triangles stored, triangles drawn (each mesh as often as nodes show it), and those dropped, from the notes.
@@ -44,8 +22,7 @@ fn triangle_counts(scene: &Scene) -> (usize, usize, usize) {
 #[test]
 fn every_shared_scene_loads_soundly() {
     let Some(folder) = shared("scenes") else { return };
-    let mut files = Vec::new();
-    gltf_files(&folder, &mut files);
+    let files = gltf_files(&folder);
     assert!(files.len() > 90, "{} files", files.len());
     for file in files {
         let name = file.strip_prefix(&folder).unwrap().to_string_lossy().into_owned();
@@ -87,7 +64,7 @@ fn triangle_counts_match_the_manifest() {
 }
 
 /// What [`Scene`] promises: indices in range, parents first, array lengths equal, unit vectors, finite numbers.
-fn assert_sound(scene: &Scene, name: &str) {
+pub fn assert_sound(scene: &Scene, name: &str) {
     assert!(!scene.materials.is_empty(), "{name}");
     for (index, node) in scene.nodes.iter().enumerate() {
         assert!(node.parent.is_none_or(|parent| (parent as usize) < index), "{name}: node {index}");

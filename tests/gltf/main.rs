@@ -1,0 +1,8 @@
+//! The glTF loader: valid files hold what they should, bad ones end in clean errors.
+
+mod bad;
+mod conformance;
+mod features;
+mod mutated;
+mod shared_bad;
+mod support;
