@@ -46,6 +46,8 @@ impl PixelView {
 }
 
 /// Offsets within the pixel of `count` samples: the R2 sequence, evenly spread for any count.       [Roberts2018]
+///
+/// [Roberts2018]: crate::methods::PAPERS
 pub fn sample_offset(index: u32, count: u32) -> Vec2 {
     if count == 1 {
         return Vec2::ZERO;

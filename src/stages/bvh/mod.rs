@@ -138,6 +138,8 @@ impl Bvh {
 
     /// Expected visits of nodes and triangles by a ray that crosses the scene (surface area heuristic), by the bounds of
     /// the last refit; waits for the device.                                               [Goldsmith1987]
+    ///
+    /// [Goldsmith1987]: crate::methods::PAPERS
     pub fn sah_cost(&self, context: &Context) -> Result<f32, BvhError> {
         let cost = context.download_range(&self.subtree_costs, 0..1)?;
         let root = context.download_range(&self.nodes, 0..1)?;
