@@ -129,7 +129,7 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
         (&["--method", "radiosity"], "explicit-visibility, path-tracing"),
         (&["--method", "path-trace"], "did you mean path-tracing?"),
         (&["--set", "rays=9"], "did you mean"),
-        (&["--set", "rays_per_element=9"], "a whole number from 16 to 4096"),
+        (&["--set", "rays_per_element=9"], "one of 16, 64, 144, 256"),
         (&["--size", "0x10"], "a side is 1 to 16384 pixels"),
         (&["--env", "1,2"], "three numbers"),
         (&["--spp", "4"], "applies to path-tracing only"),

@@ -49,7 +49,12 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
     let irradiance =
         |value: f32| context.upload("test/irradiance", &vec![Vec3::splat(value); world.vertex_count as usize]).unwrap();
     let (direct_irradiance, indirect_irradiance) = (irradiance(direct), irradiance(indirect));
-    let light = VertexLight { direct_irradiance: &direct_irradiance, indirect_irradiance: &indirect_irradiance };
+    let back_elements = context.upload("test/back elements", &vec![u32::MAX; world.vertex_count as usize]).unwrap();
+    let light = VertexLight {
+        direct_irradiance: &direct_irradiance,
+        indirect_irradiance: &indirect_irradiance,
+        back_elements: &back_elements,
+    };
     let mut recorder = context.recorder("frame").unwrap();
     shadow_maps.draw(&mut recorder, &world, &pose, bounds);
     vertex::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, view, samples, &film);

@@ -1,13 +1,15 @@
 #version 460
 #include "lib/prelude.glsl"
 #include "lib/brdf.glsl"
+#include "lib/element.glsl"
 #include "lib/environment.glsl"
 #include "lib/light.glsl"
 #include "lib/shadow.glsl"
 #include "lib/specular_albedo.glsl"
 
 // One thread per pixel: punctual light by shadow maps, all other light interpolated between the vertices' irradiance.
-// reads the G-buffer, triangles, positions, direct_irradiance and indirect_irradiance [vertex_count] (W/m2), lights,
+// reads the G-buffer, triangles, positions, direct_irradiance and indirect_irradiance [element_count] (W/m2),
+//       back_elements[vertex_count], lights,
 //       shadow maps, the environment   updates direct, indirect, albedo, normal, depth [pixel_count]   shared none
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
@@ -20,17 +22,18 @@ layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles
 layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer DirectIrradiance { vec3 direct_irradiance[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer IndirectIrradiance { vec3 indirect_irradiance[]; };
-layout(set = 0, binding = 10, scalar) readonly buffer Lights { Light lights[]; };
-layout(set = 0, binding = 11, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer ShadowViews { ShadowView shadow_views[]; };
-layout(set = 0, binding = 13) uniform sampler2DArrayShadow shadow_maps;
-layout(set = 0, binding = 14, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
-layout(set = 0, binding = 15) uniform sampler2D environment_map;
-layout(set = 0, binding = 16, scalar) buffer Direct { vec3 direct[]; };
-layout(set = 0, binding = 17, scalar) buffer Indirect { vec3 indirect[]; };
-layout(set = 0, binding = 18, scalar) buffer AlbedoSum { vec3 albedo[]; };
-layout(set = 0, binding = 19, scalar) buffer NormalSum { vec3 normal[]; };
-layout(set = 0, binding = 20, scalar) buffer DepthSum { float depth[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer BackElements { uint back_elements[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer Lights { Light lights[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer ShadowViews { ShadowView shadow_views[]; };
+layout(set = 0, binding = 14) uniform sampler2DArrayShadow shadow_maps;
+layout(set = 0, binding = 15, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
+layout(set = 0, binding = 16) uniform sampler2D environment_map;
+layout(set = 0, binding = 17, scalar) buffer Direct { vec3 direct[]; };
+layout(set = 0, binding = 18, scalar) buffer Indirect { vec3 indirect[]; };
+layout(set = 0, binding = 19, scalar) buffer AlbedoSum { vec3 albedo[]; };
+layout(set = 0, binding = 20, scalar) buffer NormalSum { vec3 normal[]; };
+layout(set = 0, binding = 21, scalar) buffer DepthSum { float depth[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
 layout(push_constant, scalar) uniform Params {
     mat4 clip_from_world;
@@ -107,7 +110,12 @@ void main()
     if (s.reflects) {
         uvec3 v = triangles[seen - 1];
         vec3 geometric = normalize(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]));
-        if (dot(geometric, to_eye) < 0.0) geometric = -geometric;
+        uvec3 elements = v;
+        if (dot(geometric, to_eye) < 0.0) {
+            geometric = -geometric;
+            uvec3 backs = uvec3(back_elements[v.x], back_elements[v.y], back_elements[v.z]);
+            if (backs.x != NO_ELEMENT) elements = backs;
+        }
 
         for (uint light = 0; light < params.light_count; ++light) {
             vec3 to_light;
@@ -122,8 +130,8 @@ void main()
         // Interpolated irradiance reflects as if it came evenly from all sides, the specular lobe included.
         vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
         vec3 reflectance = (s.albedo + specular_albedo(s, dot(s.normal, to_eye))) / PI;
-        direct_sum += reflectance * (w.x * direct_irradiance[v.x] + w.y * direct_irradiance[v.y] + w.z * direct_irradiance[v.z]);
-        indirect_sum = reflectance * (w.x * indirect_irradiance[v.x] + w.y * indirect_irradiance[v.y] + w.z * indirect_irradiance[v.z]);
+        direct_sum += reflectance * (w.x * direct_irradiance[elements.x] + w.y * direct_irradiance[elements.y] + w.z * direct_irradiance[elements.z]);
+        indirect_sum = reflectance * (w.x * indirect_irradiance[elements.x] + w.y * indirect_irradiance[elements.y] + w.z * indirect_irradiance[elements.z]);
     }
     float along = dot(position.xyz, params.forward) - params.eye_along;
     float distance_to_eye = params.eye.w == 0.0 ? along : distance(position.xyz, params.eye.xyz);

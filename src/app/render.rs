@@ -259,7 +259,7 @@ mod tests {
             (&["--indirect-only", "--bounces", "0"], "at least 1 bounce"),
             (&["--indirect-only", "--direct-only"], "cannot be used with"),
             (&["--set", "rays=4"], "did you mean rotate_rays or rays_per_element?"),
-            (&["--set", "rays_per_element=4"], "from 16 to 4096"),
+            (&["--set", "rays_per_element=4"], "one of 16, 64, 144, 256"),
             (&["--bounces", "65"], "0..=64"),
             (&["--profile", "a.json", "--trace", "a.json"], "two outputs are called a.json"),
             (&["--profile", "no/such/folder/a.json"], "does not exist"),

@@ -17,6 +17,8 @@ pub struct VertexLight<'a> {
     pub direct_irradiance: &'a Buffer<Vec3>,
     /// Reflected at least once.
     pub indirect_irradiance: &'a Buffer<Vec3>,
+    /// Per vertex: the entry of the two above that its back shows; u32::MAX shows the front's.
+    pub back_elements: &'a Buffer<u32>,
 }
 
 /// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
@@ -47,6 +49,7 @@ pub fn draw(
                 positions: &world.positions,
                 direct_irradiance: light.direct_irradiance,
                 indirect_irradiance: light.indirect_irradiance,
+                back_elements: light.back_elements,
                 lights: &world.lights,
                 shadow_lights: &shadow_maps.lights,
                 shadow_views: &shadow_maps.views,

@@ -1,7 +1,12 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
 pub mod bvh;
+pub mod elements;
+pub mod emitters;
 pub mod film;
+pub mod gather;
+pub mod links;
+pub mod punctual;
 pub mod scan;
 pub mod trace;
 pub mod world;

@@ -3,6 +3,5 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod meshes;
-mod ray_query;
 mod structure;
 mod trace;

@@ -8,6 +8,7 @@
 //! Texels are radiance, W m^-2 sr^-1, linear Rec. 709, taken one to one. Between texel centres radiance is bilinear,
 //! around the seam too. [`sampling`] chooses directions by importance. Loading is in [`load`].
 
+mod average;
 pub mod load;
 pub mod sampling;
 

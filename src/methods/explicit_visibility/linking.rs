@@ -1,0 +1,123 @@
+//! From rays to links: batches of elements cast, trace and merge, within the memory there is.
+
+use super::{RayCount, Settings, Stage};
+use crate::gpu::shaders::methods::explicit_visibility as passes;
+use crate::gpu::shaders::types::{Hit, Ray};
+use crate::gpu::{Context, GpuError};
+use crate::scene::environment::Environment;
+use crate::stages::elements::{ElementTopology, Elements};
+use crate::stages::links::{LinkBuilder, LinkError, LinkFormat, Links, Outcomes};
+use crate::stages::trace;
+use crate::stages::world::WorldEnvironment;
+
+/// Rays of a batch, where memory allows.
+const BATCH_RAYS: u64 = 1 << 19;
+
+/// Why the method cannot be prepared.
+#[derive(Debug, thiserror::Error)]
+pub enum ExplicitError {
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Link(#[from] LinkError),
+    #[error(
+        "explicit visibility needs {needed} bytes beside its links for {elements} elements, {available} are available; \
+         lower --elements or rays_per_element"
+    )]
+    OutOfMemory { needed: u64, available: u64, elements: u64 },
+}
+
+/// What will be allocated, counted before.
+pub(super) struct Sizes {
+    ray_count: u32,
+    /// Elements of a batch.
+    batch: u32,
+    /// Bytes that links may take.
+    link_budget: u64,
+}
+
+impl Sizes {
+    /// Refuses what does not fit the device or `budget` bytes, links not yet counted.
+    pub fn new(
+        context: &Context,
+        topology: &ElementTopology,
+        light_count: u32,
+        settings: &Settings,
+        budget: u64,
+    ) -> Result<Self, ExplicitError> {
+        let ray_count = settings.rays_per_element.get();
+        let elements = topology.vertices.len() as u64;
+        let limit = context.limits().storage_buffer_bytes;
+        let per_element = (u64::from(ray_count) * size_of::<Ray>() as u64).max(LinkBuilder::batch_bytes(ray_count));
+        let batch = (BATCH_RAYS / u64::from(ray_count)).min(limit / per_element).clamp(1, elements.max(1));
+        let mut sizes = Self { ray_count, batch: batch as u32, link_budget: 0 };
+
+        let per_ray = (size_of::<Ray>() + size_of::<Hit>()) as u64;
+        let batch_bytes = batch * (u64::from(ray_count) * per_ray + LinkBuilder::batch_bytes(ray_count));
+        let shadow_bytes = sizes.shadow_rays() as u64 * (size_of::<Ray>() + size_of::<u32>()) as u64;
+        let light_words = 6 * 3 + u64::from(light_count);
+        let bit_words = u64::from(ray_count.div_ceil(32) + settings.emitter_samples.div_ceil(32) + 1);
+        let needed =
+            Elements::bytes_needed(topology) + batch_bytes + shadow_bytes + 4 * elements * (light_words + bit_words);
+        let available = budget.min(context.available_bytes());
+        if needed > available {
+            return Err(ExplicitError::OutOfMemory { needed, available, elements });
+        }
+        sizes.link_budget = budget - needed;
+        Ok(sizes)
+    }
+
+    /// Rays of a batch of shadow rays: one element's rays to every emitter sample fit in any case.
+    pub fn shadow_rays(&self) -> usize {
+        (self.batch * self.ray_count).max(1024) as usize
+    }
+}
+
+/// Casts the rays of all elements and makes their links.                           [Schmitz2008 3.2]
+pub(super) fn build(
+    context: &Context,
+    stage: &Stage<'_>,
+    settings: &Settings,
+    elements: &Elements,
+    outcomes: &Outcomes,
+    sizes: &Sizes,
+) -> Result<Links, ExplicitError> {
+    let (ray_count, batch) = (sizes.ray_count, sizes.batch);
+    let rays = context.buffer("links/rays", (batch * ray_count) as usize)?;
+    let hits = context.buffer("links/hits", rays.len())?;
+    let format = if settings.packed_links { LinkFormat::Packed } else { LinkFormat::Full };
+    let mut builder = LinkBuilder::new(context, format, elements.count, ray_count, batch, sizes.link_budget)?;
+    for first_element in (0..elements.count).step_by(batch as usize) {
+        let range = first_element..elements.count.min(first_element + batch);
+        let batch_rays = range.len() * ray_count as usize;
+        let mut recorder = context.recorder("links")?;
+        let pass = passes::Rays {
+            ray_origins: &elements.ray_origins,
+            element_normals: &elements.normals,
+            rays: &rays,
+            params: passes::RaysParams {
+                first_element,
+                batch_count: range.len() as u32,
+                side: settings.rays_per_element.side(),
+                is_rotated: u32::from(settings.rotate_rays),
+            },
+        };
+        recorder.dispatch(&pass, batch_rays);
+        trace::closest_hit(&mut recorder, &stage.tracer, &rays, &hits, batch_rays);
+        let world = stage.world;
+        builder.merge(&mut recorder, range.clone(), &hits, &world.triangles, &elements.back_elements, outcomes);
+        recorder.submit()?;
+        builder.append(range)?;
+    }
+    Ok(builder.finish())
+}
+
+/// The environment at the density of the rays, so that none of its light falls between them.
+pub(super) fn averaged_environment(
+    context: &Context,
+    environment: &Environment,
+    rays: RayCount,
+) -> Result<WorldEnvironment, GpuError> {
+    // 2 side^2 texels over the sphere: as many as there are rays over the two halves of it.
+    WorldEnvironment::new(context, &environment.averaged(2 * rays.side(), rays.side()))
+}

@@ -1,0 +1,226 @@
+//! Emissive surfaces as light sources of their own: points on them, and which points each element sees.
+//!
+//! A part that emits is either *sampled* here, point by point with shadow rays, or *linked*: a method carries its
+//! light along its own transport. Each part is one or the other, so that no light counts twice. Visibility is kept as
+//! bits: other emission needs no rays.
+
+use super::elements::{Elements, NO_ELEMENT};
+use super::trace::{self, Tracer};
+use super::world::World;
+use crate::gpu::shaders::elements as passes;
+use crate::gpu::shaders::types::{EmitterSample, Ray};
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::geometry::Geometry;
+use glam::{Vec2, Vec3};
+
+crate::choice! {
+    /// How light of emissive surfaces reaches the elements directly.
+    pub enum EmitterChoice {
+        /// Sampled where a part is at most a twentieth of all area, else linked
+        Auto = "auto",
+        /// Along links, like reflected light
+        Linked = "linked",
+        /// By shadow rays to points on them
+        Sampled = "sampled",
+    }
+}
+
+/// Largest share of the scene's area of a part that [`EmitterChoice::Auto`] samples.
+const SMALL_PART: f32 = 0.05;
+
+/// Which parts are sampled, and where.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EmitterPlan {
+    pub samples: Vec<EmitterSample>,
+    /// Per part.
+    pub is_sampled: Vec<bool>,
+    pub sampled_parts: u32,
+    pub linked_parts: u32,
+}
+
+impl EmitterPlan {
+    /// Spreads `sample_count` points over the sampled parts in proportion to power: evenly along the sum of powers,
+    /// then inside each triangle by a sequence that fills it evenly [Roberts2018 R2].
+    ///
+    /// `positions` in world space at rest and `emission` (W m^-2 sr^-1) per vertex; `is_double_sided` per vertex.
+    pub fn new(
+        geometry: &Geometry,
+        positions: &[Vec3],
+        emission: &[Vec3],
+        is_double_sided: impl Fn(u32) -> bool,
+        choice: EmitterChoice,
+        sample_count: u32,
+    ) -> Self {
+        let corners = |t: usize| geometry.triangles[t].map(|v| positions[v as usize]);
+        let area = |t: usize| {
+            let [a, b, c] = corners(t);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let brightness =
+            |t: usize| geometry.triangles[t].iter().map(|&v| emission[v as usize].element_sum()).sum::<f32>();
+        let total_area: f32 = (0..geometry.triangles.len()).map(area).sum();
+
+        let mut plan = Self { is_sampled: vec![false; geometry.parts.len()], ..Self::default() };
+        // (triangle, power up to and with it)
+        let mut powers: Vec<(usize, f64)> = Vec::new();
+        let mut power = 0.0f64;
+        for (index, part) in geometry.parts.iter().enumerate() {
+            let triangles = part.triangle_offset as usize..(part.triangle_offset + part.triangle_count) as usize;
+            if !triangles.clone().any(|t| brightness(t) > 0.0) {
+                continue;
+            }
+            let part_area: f32 = triangles.clone().map(area).sum();
+            let sampled = match choice {
+                EmitterChoice::Auto => part_area <= SMALL_PART * total_area,
+                EmitterChoice::Linked => false,
+                EmitterChoice::Sampled => true,
+            };
+            if !sampled {
+                plan.linked_parts += 1;
+                continue;
+            }
+            plan.sampled_parts += 1;
+            plan.is_sampled[index] = true;
+            for t in triangles {
+                let own = f64::from(area(t)) * f64::from(brightness(t));
+                if own > 0.0 {
+                    power += own;
+                    powers.push((t, power));
+                }
+            }
+        }
+        let count = if powers.is_empty() { 0 } else { sample_count };
+        for k in 0..count {
+            let target = (f64::from(k) + 0.5) / f64::from(count) * power;
+            let at = powers.partition_point(|&(_, sum)| sum <= target).min(powers.len() - 1);
+            let triangle = powers[at].0;
+            // The point stands for the area that would emit its share of all power at this brightness.
+            let stands_for = power / f64::from(count) / f64::from(brightness(triangle));
+            plan.samples.push(EmitterSample {
+                triangle: triangle as u32,
+                barycentrics: point_in_triangle(k),
+                share: (stands_for / f64::from(area(triangle))) as f32,
+                is_double_sided: u32::from(is_double_sided(geometry.triangles[triangle][0])),
+            });
+        }
+        plan
+    }
+}
+
+/// The k-th point of an even sequence over a triangle.
+fn point_in_triangle(k: u32) -> Vec2 {
+    // Powers of 1 / 1.3247..., the root of x^3 = x + 1.
+    let point = Vec2::new(0.5 + 0.754_877_7 * k as f32, 0.5 + 0.569_840_3 * k as f32).fract();
+    if point.x + point.y > 1.0 { 1.0 - point } else { point }
+}
+
+/// The plan on the device, and who sees whom.
+pub struct Emitters {
+    pub plan: EmitterPlan,
+    pub samples: Buffer<EmitterSample>,
+    /// Per element: its emission is carried by samples and must not be by links.
+    pub is_sampled: Buffer<u32>,
+    /// A bit per element and sample; each element starts a word.
+    pub visible: Buffer<u32>,
+}
+
+impl Emitters {
+    pub fn new(
+        context: &Context,
+        geometry: &Geometry,
+        positions: &[Vec3],
+        elements: &Elements,
+        choice: EmitterChoice,
+        sample_count: u32,
+    ) -> Result<Self, GpuError> {
+        let emission = context.download(&elements.emission)?;
+        let back_elements = &elements.topology.back_elements;
+        let is_double_sided = |v: u32| back_elements[v as usize] != NO_ELEMENT;
+        let plan = EmitterPlan::new(geometry, positions, &emission, is_double_sided, choice, sample_count);
+        let is_sampled: Vec<u32> = (elements.topology.vertices.iter())
+            .map(|&entry| {
+                let vertex = entry & !super::elements::BACK_SIDE;
+                u32::from(plan.is_sampled[geometry.vertex_part[vertex as usize] as usize])
+            })
+            .collect();
+        let words = elements.count as usize * plan.samples.len().div_ceil(32);
+        Ok(Self {
+            samples: context.upload("emitters/samples", &plan.samples)?,
+            is_sampled: context.upload("emitters/is sampled", &is_sampled)?,
+            visible: context.buffer("emitters/visible", words)?,
+            plan,
+        })
+    }
+
+    /// Sees again which samples each element sees, in batches that fit `rays`. Returns the number of shadow rays.
+    pub fn trace(
+        &self,
+        recorder: &mut Recorder<'_>,
+        tracer: &Tracer<'_>,
+        world: &World,
+        elements: &Elements,
+        rays: &Buffer<Ray>,
+        is_free: &Buffer<u32>,
+    ) -> u64 {
+        let sample_count = self.plan.samples.len() as u32;
+        let batch = (rays.len().min(is_free.len()) as u32).checked_div(sample_count).unwrap_or(0);
+        if batch == 0 {
+            return 0;
+        }
+        for first_element in (0..elements.count).step_by(batch as usize) {
+            let batch_count = batch.min(elements.count - first_element);
+            let ray_count = batch_count * sample_count;
+            recorder.dispatch(
+                &passes::EmitterRays {
+                    element_normals: &elements.normals,
+                    ray_origins: &elements.ray_origins,
+                    samples: &self.samples,
+                    triangles: &world.triangles,
+                    positions: &world.positions,
+                    rays,
+                    params: passes::EmitterRaysParams {
+                        first_element,
+                        batch_count,
+                        sample_count,
+                        ray_offset: elements.ray_offset,
+                    },
+                },
+                ray_count,
+            );
+            trace::any_hit(recorder, tracer, rays, is_free, ray_count as usize);
+            let words = sample_count.div_ceil(32);
+            let params = passes::PackVisibilityParams {
+                first_word: first_element * words,
+                row_count: batch_count,
+                row_length: sample_count,
+            };
+            recorder.dispatch(&passes::PackVisibility { is_free, visible: &self.visible, params }, batch_count * words);
+        }
+        u64::from(elements.count) * u64::from(sample_count)
+    }
+
+    /// Irradiance from all samples, W/m2; black without any.
+    pub fn irradiance(
+        &self,
+        recorder: &mut Recorder<'_>,
+        world: &World,
+        elements: &Elements,
+        irradiance: &Buffer<Vec3>,
+    ) {
+        let pass = passes::EmitterIrradiance {
+            element_positions: &elements.positions,
+            element_normals: &elements.normals,
+            samples: &self.samples,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            emission: &elements.emission,
+            visible: &self.visible,
+            irradiance,
+            params: passes::EmitterIrradianceParams {
+                element_count: elements.count,
+                sample_count: self.plan.samples.len() as u32,
+            },
+        };
+        recorder.dispatch(&pass, elements.count);
+    }
+}

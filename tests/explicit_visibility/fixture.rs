@@ -1,0 +1,101 @@
+//! A scene made ready for the method, in one value.
+
+use crate::common::TestContext;
+use glam::Vec3;
+use linklight::methods::explicit_visibility::{ExplicitVisibility, Settings, Stage};
+use linklight::scene::builtin::{self, Source};
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::pose::Pose;
+use linklight::scene::tessellate::{Fineness, tessellate};
+use linklight::scene::{Scene, deform, load_bytes};
+use linklight::stages::bvh::Bvh;
+use linklight::stages::trace::Tracer;
+use linklight::stages::world::World;
+
+const MEMORY: u64 = 1 << 30;
+
+/// A scene, posed, on the device, with its hierarchy.
+pub struct Fixture {
+    pub scene: Scene,
+    pub geometry: Geometry,
+    pub rest_positions: Vec<Vec3>,
+    pub environment: Environment,
+    pub world: World,
+    pub bvh: Bvh,
+}
+
+pub fn builtin_scene(name: &str) -> Scene {
+    match builtin::resolve(name).unwrap() {
+        Source::File(bytes) => load_bytes(name, bytes).unwrap(),
+    }
+}
+
+impl Fixture {
+    /// Tessellated to edges of at most `max_edge` (metres), posed at `seconds`.
+    pub fn at(
+        context: &TestContext,
+        scene: Scene,
+        max_edge: Option<f32>,
+        environment: Environment,
+        seconds: f32,
+    ) -> Self {
+        let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
+        let rest = Pose::rest(&scene);
+        let (geometry, rest_positions) = match max_edge {
+            Some(length) => {
+                let cut = tessellate(geometry, &rest, Fineness::MaxEdge(length), MEMORY).unwrap();
+                (cut.geometry, cut.rest_positions)
+            }
+            None => {
+                let positions = deform::world_positions(&geometry, &rest);
+                (geometry, positions)
+            }
+        };
+        let pose = if seconds == 0.0 { rest } else { Pose::at(&scene, seconds) };
+        let world = World::new(context, &scene, &geometry, &pose, &environment, true).unwrap();
+        let positions = context.download(&world.positions).unwrap();
+        let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
+        Self { scene, geometry, rest_positions, environment, world, bvh }
+    }
+
+    pub fn new(context: &TestContext, scene: Scene, max_edge: Option<f32>) -> Self {
+        Self::at(context, scene, max_edge, Environment::default(), 0.0)
+    }
+
+    pub fn stage(&self) -> Stage<'_> {
+        Stage {
+            scene: &self.scene,
+            geometry: &self.geometry,
+            rest_positions: &self.rest_positions,
+            environment: &self.environment,
+            world: &self.world,
+            tracer: Tracer::Compute(&self.bvh),
+        }
+    }
+
+    pub fn prepare(&self, context: &TestContext, settings: Settings) -> ExplicitVisibility {
+        ExplicitVisibility::prepare(context, &self.stage(), settings).unwrap()
+    }
+}
+
+/// What a solve leaves, downloaded.
+pub struct Solution {
+    pub punctual: Vec<Vec3>,
+    pub direct: Vec<Vec3>,
+    pub indirect: Vec<Vec3>,
+    /// Of the last bounce alone; all direct light without bounces.
+    pub last: Vec<Vec3>,
+}
+
+pub fn solve(context: &TestContext, method: &ExplicitVisibility, world: &World, bounces: u32) -> Solution {
+    let mut recorder = context.recorder("test").unwrap();
+    method.solve(&mut recorder, world, bounces);
+    recorder.submit().unwrap();
+    Solution {
+        punctual: context.download(method.punctual_irradiance()).unwrap(),
+        direct: context.download(method.direct_irradiance()).unwrap(),
+        indirect: context.download(method.indirect_irradiance()).unwrap(),
+        last: context.download(method.last_irradiance()).unwrap(),
+    }
+}
