@@ -42,13 +42,16 @@ macro_rules! file {
 }
 
 /// All built-in scenes, simplest first.
-pub static BUILTINS: [Builtin; 6] = [
+pub static BUILTINS: [Builtin; 9] = [
     file!("cornell-box", "the Cornell box as measured: two boxes under an area light"),
     file!("cornell-empty", "the Cornell box without its boxes"),
     file!("furnace", "closed room, albedo 0.5 and radiance 1 everywhere: after k bounces 2 - 2^-k"),
     file!("parallel-plates", "unit squares face to face at distance 1: form factor 0.199825"),
     file!("perpendicular-plates", "unit squares sharing an edge: form factor 0.200044"),
     file!("two-rooms", "a lit and a dark room with a closed door between them"),
+    file!("maze", "partitions lit only indirectly: the sun meets a wall the viewer cannot see"),
+    file!("office", "sun and sky through a window, desk, shelves of books, chairs; textures"),
+    file!("tea-room", "silver, copper and glazed pots on a table, arched windows, a lamp; glossy and metallic"),
 ];
 
 /// Finds a scene by `NAME` or `NAME?PARAMETERS` (without the prefix).

@@ -236,6 +236,15 @@ impl Document {
         self.meshes.len() - 1
     }
 
+    /// The same triangles in another material.
+    pub fn repainted(&mut self, name: &str, mesh: usize, material: usize) -> usize {
+        let mut copy = self.meshes[mesh].clone();
+        copy["name"] = json!(name);
+        copy["primitives"].as_array_mut().into_iter().flatten().for_each(|p| p["material"] = json!(material));
+        self.meshes.push(copy);
+        self.meshes.len() - 1
+    }
+
     pub fn place(&mut self, name: &str, mesh: usize, placement: Placement) {
         let mut node = json!({ "name": name, "mesh": mesh });
         if placement.at != Vec3::ZERO {
