@@ -2,6 +2,8 @@
 //!
 //! Most are .glb files in `assets/`, made by `tools/make_scenes` and kept inside the binary.
 
+use super::{LoadOptions, Scene, SceneError, load, load_bytes_with};
+use std::path::Path;
 use thiserror::Error;
 
 /// What a scene argument must start with to name a built-in scene.
@@ -29,6 +31,15 @@ pub enum BuiltinError {
     UnknownName { name: String },
     #[error("built-in scene '{name}' takes no parameters, but '{parameters}' was given; write builtin:{name}")]
     NoParameters { name: String, parameters: String },
+}
+
+/// Why [`open`] failed.
+#[derive(Debug, Error)]
+pub enum OpenError {
+    #[error(transparent)]
+    Builtin(#[from] BuiltinError),
+    #[error(transparent)]
+    File(#[from] SceneError),
 }
 
 macro_rules! file {
@@ -67,6 +78,19 @@ pub fn resolve(name: &str) -> Result<Source, BuiltinError> {
     }
 }
 
+/// Loads a scene by the name of a built-in one after [`PREFIX`], or by the path of a `.gltf` or `.glb` file.
+///
+/// # Errors
+/// Unknown names and parameters, and whatever [`load`] refuses.
+pub fn open(scene: &str, options: &LoadOptions) -> Result<Scene, OpenError> {
+    match scene.strip_prefix(PREFIX) {
+        Some(name) => match resolve(name)? {
+            Source::File(bytes) => Ok(load_bytes_with(scene, bytes, options)?),
+        },
+        None => Ok(load(Path::new(scene), options)?),
+    }
+}
+
 fn names() -> String {
     BUILTINS.map(|b| b.name).join(", ")
 }
@@ -80,6 +104,17 @@ mod tests {
         for builtin in &BUILTINS {
             assert_eq!(resolve(builtin.name), Ok(builtin.source));
             assert!(!builtin.description.contains('\n'), "{} has a description of one line", builtin.name);
+        }
+    }
+
+    #[test]
+    fn every_name_loads() {
+        for builtin in &BUILTINS {
+            let scene = open(&format!("{PREFIX}{}", builtin.name), &LoadOptions::default());
+            let scene = scene.unwrap_or_else(|error| panic!("{}: {error}", builtin.name));
+            assert_eq!(scene.name, builtin.name);
+            assert_eq!(scene.notes, [""; 0], "{} loads without a note", builtin.name);
+            assert_eq!(scene.cameras[0].name, "main", "{}", builtin.name);
         }
     }
 

@@ -19,6 +19,7 @@ pub mod pose;
 pub mod shapes;
 pub mod tessellate;
 
+pub use builtin::{OpenError, open};
 pub use gltf::{LoadOptions, SceneChoice, SceneError, load, load_bytes, load_bytes_with};
 
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
