@@ -4,7 +4,7 @@
 
 const float PI = 3.14159265358979;
 
-// Unit square to unit disc, keeping areas in proportion and neighbours together.          [ShirleyChiu1997]
+// Unit square to unit disc, keeping areas in proportion and neighbours together.          [Shirley1997]
 vec2 concentric_disc(vec2 u)
 {
     vec2 p = 2.0 * u - 1.0;

@@ -1,6 +1,6 @@
 #ifndef LIB_RANDOM
 #define LIB_RANDOM
-// Random numbers without state: each is a hash of what it is for.                        [JarzynskiOlano2020, pcg4d]
+// Random numbers without state: each is a hash of what it is for.                        [Jarzynski2020, pcg4d]
 
 uvec4 pcg4d(uvec4 v)
 {

@@ -3,6 +3,8 @@
 //! A part that emits is either *sampled* here, point by point with shadow rays, or *linked*: a method carries its
 //! light along its own transport. Each part is one or the other, so that no light counts twice. Visibility is kept as
 //! bits: other emission needs no rays.
+//!
+//! [Roberts2018]: crate::methods::PAPERS
 
 use super::elements::{Elements, NO_ELEMENT};
 use super::trace::{self, Tracer};
@@ -40,7 +42,7 @@ pub struct EmitterPlan {
 
 impl EmitterPlan {
     /// Spreads `sample_count` points over the sampled parts in proportion to power: evenly along the sum of powers,
-    /// then inside each triangle by a sequence that fills it evenly [Roberts2018 R2].
+    /// then inside each triangle by a sequence that fills it evenly [Roberts2018].
     ///
     /// `positions` in world space at rest and `emission` (W m^-2 sr^-1) per vertex; `is_double_sided` per vertex.
     pub fn new(

@@ -3,5 +3,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod meshes;
+mod ray_query;
 mod structure;
 mod trace;

@@ -5,13 +5,15 @@ use crate::meshes::{Mesh, cube, direction, point, ray, soup, sphere};
 use glam::{DVec3, Vec2, Vec3};
 use linklight::gpu::shaders::types::{Hit, Ray};
 use linklight::stages::bvh::Bvh;
-use linklight::stages::trace::{self, BACK_FACE, NO_HIT, Tracer};
+use linklight::stages::trace::{self, BACK_FACE, NO_HIT, OpaqueSurfaces, Tracer};
 
 pub fn cast(context: &TestContext, mesh: &Mesh, rays: &[Ray]) -> (Vec<Hit>, Vec<u32>) {
     let bvh = Bvh::build(context, &mesh.positions, &mesh.triangles).unwrap();
-    cast_by(context, &Tracer::Compute(&bvh), rays)
+    let opaque = OpaqueSurfaces::new(context).unwrap();
+    cast_by(context, &Tracer::compute(&bvh, &opaque), rays)
 }
 
+/// Closest and any hits.
 pub fn cast_by(context: &TestContext, tracer: &Tracer<'_>, rays: &[Ray]) -> (Vec<Hit>, Vec<u32>) {
     let ray_buffer = context.upload("test/rays", rays).unwrap();
     let hits = context.buffer("test/hits", rays.len()).unwrap();

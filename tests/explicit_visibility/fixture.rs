@@ -70,7 +70,7 @@ impl Fixture {
             rest_positions: &self.rest_positions,
             environment: &self.environment,
             world: &self.world,
-            tracer: Tracer::Compute(&self.bvh),
+            tracer: Tracer::compute(&self.bvh, &self.world),
         }
     }
 

@@ -1,0 +1,238 @@
+//! What this program cites, by Key. A Key is the first author's name and the year.
+
+use serde::Serialize;
+
+/// A publication cited in comments and listings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Paper {
+    /// As cited: `Schmitz2008`.
+    pub key: &'static str,
+    pub title: &'static str,
+    pub authors: &'static str,
+    pub year: u16,
+    pub venue: &'static str,
+    /// `None` where the publication has none.
+    pub doi: Option<&'static str>,
+}
+
+pub(super) const SCHMITZ_2008: Paper = Paper {
+    key: "Schmitz2008",
+    title: "Interactive Global Illumination for Deformable Geometry in CUDA",
+    authors: "Arne Schmitz, Markus Tavenrath, Leif Kobbelt",
+    year: 2008,
+    venue: "Computer Graphics Forum 27(7), Pacific Graphics",
+    doi: Some("10.1111/j.1467-8659.2008.01347.x"),
+};
+
+pub(super) const KAJIYA_1986: Paper = Paper {
+    key: "Kajiya1986",
+    title: "The Rendering Equation",
+    authors: "James T. Kajiya",
+    year: 1986,
+    venue: "Computer Graphics 20(4), SIGGRAPH",
+    doi: Some("10.1145/15922.15902"),
+};
+
+/// Everything cited, by key.
+pub const PAPERS: &[Paper] = &[
+    Paper {
+        key: "Andersson2020",
+        title: "FLIP: A Difference Evaluator for Alternating Images",
+        authors: "Pontus Andersson, Jim Nilsson, Tomas Akenine-M\u{f6}ller, Magnus Oskarsson, Kalle \u{c5}str\u{f6}m, \
+                  Mark D. Fairchild",
+        year: 2020,
+        venue: "Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2)",
+        doi: Some("10.1145/3406183"),
+    },
+    Paper {
+        key: "Blelloch1990",
+        title: "Prefix Sums and Their Applications",
+        authors: "Guy E. Blelloch",
+        year: 1990,
+        venue: "Technical Report CMU-CS-90-190, Carnegie Mellon University",
+        doi: None,
+    },
+    Paper {
+        key: "Cranley1976",
+        title: "Randomization of Number Theoretic Methods for Multiple Integration",
+        authors: "R. Cranley, T. N. L. Patterson",
+        year: 1976,
+        venue: "SIAM Journal on Numerical Analysis 13(6)",
+        doi: Some("10.1137/0713071"),
+    },
+    Paper {
+        key: "Duff2017",
+        title: "Building an Orthonormal Basis, Revisited",
+        authors: "Tom Duff, James Burgess, Per Christensen, Christophe Hery, Andrew Kensler, Max Liani, Ryusuke Villemin",
+        year: 2017,
+        venue: "Journal of Computer Graphics Techniques 6(1)",
+        doi: None,
+    },
+    Paper {
+        key: "Goldsmith1987",
+        title: "Automatic Creation of Object Hierarchies for Ray Tracing",
+        authors: "Jeffrey Goldsmith, John Salmon",
+        year: 1987,
+        venue: "IEEE Computer Graphics and Applications 7(5)",
+        doi: Some("10.1109/MCG.1987.276983"),
+    },
+    Paper {
+        key: "Hable2010",
+        title: "Uncharted 2: HDR Lighting",
+        authors: "John Hable",
+        year: 2010,
+        venue: "Game Developers Conference",
+        doi: None,
+    },
+    Paper {
+        key: "Heitz2014",
+        title: "Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs",
+        authors: "Eric Heitz",
+        year: 2014,
+        venue: "Journal of Computer Graphics Techniques 3(2)",
+        doi: None,
+    },
+    Paper {
+        key: "Jarzynski2020",
+        title: "Hash Functions for GPU Rendering",
+        authors: "Mark Jarzynski, Marc Olano",
+        year: 2020,
+        venue: "Journal of Computer Graphics Techniques 9(3)",
+        doi: None,
+    },
+    KAJIYA_1986,
+    Paper {
+        key: "Karis2014",
+        title: "Physically Based Shading on Mobile",
+        authors: "Brian Karis",
+        year: 2014,
+        venue: "Unreal Engine blog, Epic Games",
+        doi: None,
+    },
+    Paper {
+        key: "Reinhard2002",
+        title: "Photographic Tone Reproduction for Digital Images",
+        authors: "Erik Reinhard, Michael Stark, Peter Shirley, James Ferwerda",
+        year: 2002,
+        venue: "ACM Transactions on Graphics 21(3), SIGGRAPH",
+        doi: Some("10.1145/566654.566575"),
+    },
+    Paper {
+        key: "Roberts2018",
+        title: "The Unreasonable Effectiveness of Quasirandom Sequences",
+        authors: "Martin Roberts",
+        year: 2018,
+        venue: "extremelearning.com.au",
+        doi: None,
+    },
+    SCHMITZ_2008,
+    Paper {
+        key: "Shirley1997",
+        title: "A Low Distortion Map Between Disk and Square",
+        authors: "Peter Shirley, Kenneth Chiu",
+        year: 1997,
+        venue: "Journal of Graphics Tools 2(3)",
+        doi: Some("10.1080/10867651.1997.10487479"),
+    },
+    Paper {
+        key: "Veach1995",
+        title: "Optimally Combining Sampling Techniques for Monte Carlo Rendering",
+        authors: "Eric Veach, Leonidas J. Guibas",
+        year: 1995,
+        venue: "Proceedings of SIGGRAPH 95",
+        doi: Some("10.1145/218380.218498"),
+    },
+    Paper {
+        key: "Walter2007",
+        title: "Microfacet Models for Refraction through Rough Surfaces",
+        authors: "Bruce Walter, Stephen R. Marschner, Hongsong Li, Kenneth E. Torrance",
+        year: 2007,
+        venue: "Eurographics Symposium on Rendering",
+        doi: Some("10.2312/EGWR/EGSR07/195-206"),
+    },
+    Paper {
+        key: "Wang2004",
+        title: "Image Quality Assessment: From Error Visibility to Structural Similarity",
+        authors: "Zhou Wang, Alan C. Bovik, Hamid R. Sheikh, Eero P. Simoncelli",
+        year: 2004,
+        venue: "IEEE Transactions on Image Processing 13(4)",
+        doi: Some("10.1109/TIP.2003.819861"),
+    },
+    Paper {
+        key: "Woop2013",
+        title: "Watertight Ray/Triangle Intersection",
+        authors: "Sven Woop, Carsten Benthin, Ingo Wald",
+        year: 2013,
+        venue: "Journal of Computer Graphics Techniques 2(1)",
+        doi: None,
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn keys_are_sorted_and_name_author_and_year() {
+        assert!(PAPERS.is_sorted_by_key(|paper| paper.key));
+        for paper in PAPERS {
+            let name = paper.key.trim_end_matches(char::is_numeric);
+            assert_eq!(paper.key, format!("{name}{}", paper.year));
+            let first_author = paper.authors.split(',').next().unwrap_or_default();
+            assert!(first_author.ends_with(name), "{}: {first_author}", paper.key);
+        }
+    }
+
+    /// Every `[Key` of the sources, shaders and tests is in the list.
+    #[test]
+    fn every_citation_has_its_paper() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let mut cited = 0;
+        for folder in ["src", "glsl", "tests"] {
+            for file in files(&root.join(folder)) {
+                let text = std::fs::read_to_string(&file).unwrap();
+                for key in citations(&text) {
+                    assert!(
+                        PAPERS.iter().any(|paper| paper.key == key),
+                        "[{key}] in {} is not in PAPERS",
+                        file.display()
+                    );
+                    cited += 1;
+                }
+            }
+        }
+        assert!(cited > 20, "only {cited} citations were found");
+    }
+
+    #[test]
+    fn citations_are_recognised() {
+        let text = "as in [Schmitz2008 3.2], [Wang2004]: but not [0], [Vec3], a[Index2], [Some2008x] or [1986]";
+        assert_eq!(citations(text), ["Schmitz2008", "Wang2004"]);
+    }
+
+    /// Names with a year behind a bracket, up to anything but a letter or digit.
+    fn citations(text: &str) -> Vec<&str> {
+        let keys = text.split('[').skip(1).filter_map(|rest| {
+            let key = &rest[..rest.find(|c: char| !c.is_ascii_alphanumeric())?];
+            let name = key.trim_end_matches(|c: char| c.is_ascii_digit());
+            let named =
+                name.starts_with(|c: char| c.is_ascii_uppercase()) && name.chars().all(|c| c.is_ascii_alphabetic());
+            (named && key.len() == name.len() + 4).then_some(key)
+        });
+        keys.collect()
+    }
+
+    fn files(folder: &Path) -> Vec<std::path::PathBuf> {
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                found.extend(files(&path));
+            } else if path.extension().is_some_and(|extension| extension != "glb" && extension != "bin") {
+                found.push(path);
+            }
+        }
+        found
+    }
+}
