@@ -56,10 +56,7 @@ void main()
         // The vertex's third of a triangle has its centre at weights (22, 7, 7) / 36.
         vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
         VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
-        VertexAttributes at;
-        at.uv0 = w.x * p.uv0 + w.y * q.uv0 + w.z * r.uv0;
-        at.uv1 = w.x * p.uv1 + w.y * q.uv1 + w.z * r.uv1;
-        at.color = w.x * p.color + w.y * q.color + w.z * r.color;
+        VertexAttributes at = interpolated(p, q, r, w);
         region_uv = vec2(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
 
         Material m = materials[triangle_materials[triangle]];

@@ -59,4 +59,58 @@ vec3 brdf_value(Surface s, vec3 to_eye, vec3 to_light)
     float passed = 1.0 - max(fresnel.r, max(fresnel.g, fresnel.b));
     return s.albedo * (passed / PI) + fresnel * specular;
 }
+
+// Share of samples that the specular lobe gets: what it reflects of all that is reflected, roughly.
+float specular_share(Surface s, float cos_eye)
+{
+    if (!has_specular(s)) return 0.0;
+    vec3 fresnel = schlick_fresnel(s, cos_eye);
+    float passed = 1.0 - max(fresnel.r, max(fresnel.g, fresnel.b));
+    float diffuse = (s.albedo.r + s.albedo.g + s.albedo.b) * passed;
+    float specular = fresnel.r + fresnel.g + fresnel.b;
+    if (diffuse <= 0.0) return 1.0;
+    return clamp(specular / (specular + diffuse), 0.1, 0.9);
+}
+
+// Density with which brdf_sample draws `to_light`, sr^-1.
+float brdf_density(Surface s, vec3 to_eye, vec3 to_light)
+{
+    float cos_light = dot(s.normal, to_light);
+    to_eye = folded_eye(s.normal, to_eye);
+    float cos_eye = dot(s.normal, to_eye);
+    float share = specular_share(s, cos_eye);
+    float density = (1.0 - share) * max(cos_light, 0.0) / PI;
+    vec3 sum = to_eye + to_light;
+    float squared = dot(sum, sum);
+    if (share == 0.0 || squared < 1e-12) return density;
+
+    // Visible normals D G1 (v.h) / (n.v), and dh / dl = 1 / (4 v.h).
+    vec3 halfway = sum / sqrt(squared);
+    float visible = ggx_distribution(s.normal, halfway, s.alpha) * 0.5 / (cos_eye + smith_root(cos_eye, s.alpha));
+    return density + (dot(s.normal, halfway) > 0.0 ? share * visible : 0.0);
+}
+
+// A microfacet normal about +z out of those that `eye` sees.                                    [Dupuy2023]
+vec3 visible_normal(vec3 eye, float alpha, vec2 u)
+{
+    vec3 stretched = vec3(alpha * eye.xy, eye.z);
+    stretched /= sqrt(dot(stretched, stretched));
+    float phi = 2.0 * PI * u.x;
+    float z = (1.0 - u.y) * (1.0 + stretched.z) - stretched.z;
+    float sine = sqrt(clamp(1.0 - z * z, 0.0, 1.0));
+    vec3 cap = vec3(sine * cos(phi), sine * sin(phi), z) + stretched;
+    vec3 normal = vec3(alpha * cap.xy, max(cap.z, 1e-7));
+    return normal / sqrt(dot(normal, normal));
+}
+
+// A direction for light to come from, in proportion to the reflected radiance, nearly. It may lie below the plane of
+// the normal, where nothing is reflected.
+vec3 brdf_sample(Surface s, vec3 to_eye, vec3 u)
+{
+    to_eye = folded_eye(s.normal, to_eye);
+    mat3 basis = basis_of(s.normal);
+    if (u.x >= specular_share(s, dot(s.normal, to_eye))) return basis * cosine_hemisphere(u.yz);
+    vec3 halfway = basis * visible_normal(to_eye * basis, s.alpha, u.yz);
+    return 2.0 * dot(to_eye, halfway) * halfway - to_eye;
+}
 #endif

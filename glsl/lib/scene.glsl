@@ -16,6 +16,16 @@ struct VertexAttributes {
     vec4 color;
 };
 
+// Attributes inside a triangle, by the weights of its vertices.
+VertexAttributes interpolated(VertexAttributes p, VertexAttributes q, VertexAttributes r, vec3 w)
+{
+    VertexAttributes a;
+    a.uv0 = w.x * p.uv0 + w.y * q.uv0 + w.z * r.uv0;
+    a.uv1 = w.x * p.uv1 + w.y * q.uv1 + w.z * r.uv1;
+    a.color = w.x * p.color + w.y * q.color + w.z * r.color;
+    return a;
+}
+
 // One drawn (node, primitive) pair.
 struct Part {
     mat4x3 world_from_local;

@@ -1,6 +1,7 @@
 #version 460
 #include "lib/prelude.glsl"
 #include "lib/scene.glsl"
+#include "lib/unit.glsl"
 
 // One thread per vertex: morph, then skin or node transform, to world space.                 [glTF 2.0 3.7.2, 3.7.3]
 // reads local_vertices, vertex_parts[vertex_count], parts, influences, palette, morph_deltas, morph_weights
@@ -17,13 +18,6 @@ layout(set = 0, binding = 7, scalar) writeonly buffer Positions { vec3 positions
 layout(set = 0, binding = 8, scalar) writeonly buffer Normals { vec3 normals[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Tangents { vec4 tangents[]; };
 layout(push_constant, scalar) uniform Params { uint vertex_count; } params;
-
-// Exact division and square root: results must not depend on the machine.
-vec3 unit_or(vec3 v, vec3 otherwise)
-{
-    float squared = dot(v, v);
-    return squared > 0.0 ? v / sqrt(squared) : otherwise;
-}
 
 // Inverse transpose up to a positive factor, by cofactors: defined for singular matrices too.
 mat3 normal_matrix(mat3 m)

@@ -53,6 +53,14 @@ pub const PAPERS: &[Paper] = &[
         doi: None,
     },
     Paper {
+        key: "Chao1982",
+        title: "A General Purpose Unequal Probability Sampling Plan",
+        authors: "Min-Te Chao",
+        year: 1982,
+        venue: "Biometrika 69(3)",
+        doi: Some("10.1093/biomet/69.3.653"),
+    },
+    Paper {
         key: "Cranley1976",
         title: "Randomization of Number Theoretic Methods for Multiple Integration",
         authors: "R. Cranley, T. N. L. Patterson",
@@ -67,6 +75,14 @@ pub const PAPERS: &[Paper] = &[
         year: 2017,
         venue: "Journal of Computer Graphics Techniques 6(1)",
         doi: None,
+    },
+    Paper {
+        key: "Dupuy2023",
+        title: "Sampling Visible GGX Normals with Spherical Caps",
+        authors: "Jonathan Dupuy, Anis Benyoub",
+        year: 2023,
+        venue: "Computer Graphics Forum 42(8), High-Performance Graphics",
+        doi: Some("10.1111/cgf.14867"),
     },
     Paper {
         key: "Goldsmith1987",
@@ -141,6 +157,14 @@ pub const PAPERS: &[Paper] = &[
         year: 1995,
         venue: "Proceedings of SIGGRAPH 95",
         doi: Some("10.1145/218380.218498"),
+    },
+    Paper {
+        key: "Waechter2019",
+        title: "A Fast and Robust Method for Avoiding Self-Intersection",
+        authors: "Carsten W\u{e4}chter, Nikolaus Binder",
+        year: 2019,
+        venue: "Ray Tracing Gems",
+        doi: Some("10.1007/978-1-4842-4427-2_6"),
     },
     Paper {
         key: "Walter2007",

@@ -8,6 +8,7 @@
 //! taken one to one as W/sr (point, spot) and W/m2 (directional).
 
 pub mod adjacency;
+pub mod alias;
 pub mod animation;
 pub mod builtin;
 pub mod camera;

@@ -2,6 +2,7 @@
 
 pub mod bvh;
 pub mod elements;
+pub mod emissive_triangles;
 pub mod emitters;
 pub mod film;
 pub mod gather;
@@ -9,4 +10,5 @@ pub mod links;
 pub mod punctual;
 pub mod scan;
 pub mod trace;
+pub mod view;
 pub mod world;

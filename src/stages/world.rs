@@ -4,7 +4,8 @@
 //! without a rebuild: the pose (node, joint and morph animation), lights, environment, materials.
 
 use crate::gpu::shaders::types::{
-    EnvironmentInfo, Influence, Light, LocalVertex, Material, MorphDelta, Part, TextureSlot, VertexAttributes,
+    EnvironmentCell, EnvironmentInfo, Influence, Light, LocalVertex, Material, MorphDelta, Part, TextureSlot,
+    VertexAttributes,
 };
 use crate::gpu::shaders::world::{Deform, DeformParams};
 use crate::gpu::{
@@ -66,6 +67,8 @@ pub struct WorldEnvironment {
     /// Radiance in RGB; 1 x 1 for a constant.
     pub map: Image,
     pub sampler: Sampler,
+    /// Alias table for drawing directions by importance.
+    pub cells: Buffer<EnvironmentCell>,
 }
 
 impl World {
@@ -192,6 +195,9 @@ impl WorldEnvironment {
                 map.height,
             ),
         };
+        let cells = tables.cells.iter();
+        let cells: Vec<_> =
+            cells.map(|c| EnvironmentCell { threshold: c.threshold, alias: c.alias, density: c.density }).collect();
         let map = context.image(&ImageDescription {
             name: "world/environment",
             width,
@@ -209,6 +215,7 @@ impl WorldEnvironment {
             info_buffer: context.upload("world/environment info", &[info])?,
             map,
             sampler: context.sampler("world/environment", SamplerDescription::NEAREST_CLAMP)?,
+            cells: context.upload("world/environment cells", &cells)?,
         })
     }
 }

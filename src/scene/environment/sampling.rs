@@ -10,6 +10,7 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 
+use super::super::alias::alias_table;
 use super::{Environment, EnvironmentMap};
 
 /// Larger maps are sampled by blocks of texels, so that tables stay within 24 MiB.
@@ -172,23 +173,4 @@ fn bilinear_luminance(map: &EnvironmentMap, x: u32, y: u32) -> f64 {
 fn luminance(radiance: Vec3) -> f64 {
     let [r, g, b] = radiance.to_array().map(f64::from);
     0.2126 * r + 0.7152 * g + 0.0722 * b
-}
-
-/// Vose's alias method: (threshold, alias) per entry. `probabilities` sum to one.
-fn alias_table(probabilities: &[f64]) -> Vec<(f32, u32)> {
-    let count = probabilities.len() as f64;
-    let mut scaled: Vec<f64> = probabilities.iter().map(|probability| probability * count).collect();
-    let mut table: Vec<(f32, u32)> = (0..probabilities.len() as u32).map(|index| (1.0, index)).collect();
-    let (mut small, mut large): (Vec<u32>, Vec<u32>) =
-        (0..probabilities.len() as u32).partition(|&index| scaled[index as usize] < 1.0);
-    while let (Some(under), Some(&over)) = (small.pop(), large.last()) {
-        let left = scaled[under as usize];
-        table[under as usize] = (left as f32, over);
-        scaled[over as usize] -= 1.0 - left;
-        if scaled[over as usize] < 1.0 {
-            large.pop();
-            small.push(over);
-        }
-    }
-    table
 }

@@ -1,0 +1,6 @@
+//! The reference against closed forms, against itself, and against pictures made by another program.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod physics;
+mod render;
