@@ -30,8 +30,9 @@ pub enum GpuError {
     DeviceLost { last_pass: String, fault: String },
     #[error("the device did not finish `{last_pass}` within {seconds} s")]
     Timeout { last_pass: String, seconds: u64 },
-    #[error("shader {0}")]
-    Shader(String),
+    /// Asked for something that cannot be, in whole words.
+    #[error("{0}")]
+    Refused(String),
     #[error("{call} failed with {result:?} in `{last_pass}`")]
     Call { call: &'static str, result: vk::Result, last_pass: String },
 }

@@ -96,6 +96,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
         let required = [
             (core.shader_int64, "shaderInt64"),
             (core.fragment_stores_and_atomics, "fragmentStoresAndAtomics"),
+            (core.image_cube_array, "imageCubeArray"),
             (f.dynamic_rendering.dynamic_rendering, "dynamicRendering"),
             (f.synchronization2.synchronization2, "synchronization2"),
             (f.timeline_semaphore.timeline_semaphore, "timelineSemaphore"),
@@ -155,6 +156,7 @@ impl FeatureChain {
             core: vk::PhysicalDeviceFeatures {
                 shader_int64: vk::TRUE,
                 fragment_stores_and_atomics: vk::TRUE,
+                image_cube_array: vk::TRUE,
                 pipeline_statistics_query: on(optional.pipeline_statistics),
                 sampler_anisotropy: on(optional.sampler_anisotropy),
                 ..Default::default()

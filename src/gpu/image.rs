@@ -69,6 +69,29 @@ pub struct ImageDescription<'a> {
     pub shape: Shape,
 }
 
+impl ImageDescription<'_> {
+    /// Bytes of all layers of mip level 0.
+    fn size_bytes(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height) * u64::from(self.layers) * self.format.bytes_per_pixel()
+    }
+
+    /// Refuses shapes that contradict the sizes.
+    fn check(&self) -> Result<(), GpuError> {
+        let Self { name, width, height, layers, mip_levels, shape, .. } = self;
+        let possible_levels = (*width).max(*height).max(1).ilog2() + 1;
+        let wrong = match shape {
+            _ if *mip_levels == 0 || *mip_levels > possible_levels => {
+                format!("{mip_levels} mip levels, possible are 1 to {possible_levels}")
+            }
+            Shape::Flat if *layers != 1 => format!("{layers} layers, a flat image has 1"),
+            Shape::CubeArray if layers % 6 != 0 => format!("{layers} layers, cubes have 6 each"),
+            Shape::CubeArray if width != height => "sides of different length, the faces of a cube are square".into(),
+            _ => return Ok(()),
+        };
+        Err(GpuError::Refused(format!("image `{name}` of {width} x {height} has {wrong}")))
+    }
+}
+
 /// A named image with its views, usable as texture, attachment, storage image and for copies.
 pub struct Image {
     raw: vk::Image,
@@ -103,6 +126,16 @@ impl Image {
                 layers: d.layers,
                 allowed,
                 allowed_layers,
+            });
+        }
+        d.check()?;
+        let available = device.available_bytes();
+        if d.size_bytes() > available {
+            return Err(GpuError::OutOfMemory {
+                name: d.name.to_owned(),
+                bytes: d.size_bytes(),
+                available,
+                heap: "device",
             });
         }
         let mut usage =
@@ -349,8 +382,17 @@ impl TextureTable {
         let allowed = u64::from(device.limits.textures);
         let count = textures.len().max(1) as u32;
         if u64::from(count) > allowed {
-            return Err(GpuError::Shader(format!(
+            return Err(GpuError::Refused(format!(
                 "texture table: the scene has {count} textures, this device binds {allowed}; use a scene with fewer textures"
+            )));
+        }
+        let absent = |&(image, sampler): &(usize, usize)| image >= images.len() || sampler >= samplers.len();
+        if let Some(wrong) = textures.iter().position(absent) {
+            return Err(GpuError::Refused(format!(
+                "texture table: texture {wrong} takes image and sampler {:?}, there are {} and {}",
+                textures[wrong],
+                images.len(),
+                samplers.len()
             )));
         }
         // SAFETY: create infos outlive their calls; written descriptors refer to live objects that the table keeps.

@@ -24,6 +24,13 @@ pub(super) struct Instance {
     _entry: ash::Entry,
 }
 
+/// Whether the Vulkan loader knows a layer of that name, switched on or not.
+pub(super) fn has_layer(name: &CStr) -> bool {
+    // SAFETY: loading the Vulkan loader runs its initialisers, as every Vulkan program does; a plain query.
+    let layers = unsafe { ash::Entry::load().map(|entry| entry.enumerate_instance_layer_properties()) };
+    layers.is_ok_and(|layers| layers.is_ok_and(|l| l.iter().any(|l| l.layer_name_as_c_str() == Ok(name))))
+}
+
 impl Instance {
     /// `validation` asks for the Khronos layer with core and synchronization checks; a missing layer is an error,
     /// so that silence always means that somebody listened.

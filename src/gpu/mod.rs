@@ -10,6 +10,7 @@
 
 mod acceleration;
 mod buffer;
+mod capture;
 mod context;
 mod device;
 mod error;
@@ -37,6 +38,7 @@ use buffer::RawBuffer;
 
 pub use acceleration::AccelerationStructure;
 pub use buffer::Buffer;
+pub use capture::{Capture, CaptureError, prepare_capture};
 pub use context::{Context, Options};
 pub use device::{Limits, MAX_TEXTURES, MemoryUse};
 pub use error::GpuError;

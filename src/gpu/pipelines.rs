@@ -67,7 +67,7 @@ impl Pipelines {
     /// `cache_file` is where the driver's pipeline cache is kept between runs; unreadable or foreign data is ignored.
     pub fn new(device: &Arc<Device>, cache_file: Option<PathBuf>) -> Result<Self, GpuError> {
         // The driver checks the header (vendor, device, UUID) of what it is given and starts empty if it does not fit.
-        let data = cache_file.as_ref().and_then(|f| std::fs::read(f).ok()).unwrap_or_default();
+        let data = cache_file.as_ref().and_then(|f| std::fs::read(f).ok()).and_then(undamaged).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
         let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         let bindings = [vk::DescriptorSetLayoutBinding::default()
@@ -343,6 +343,7 @@ impl Pipelines {
         let data = unsafe { self.device.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
         std::fs::create_dir_all(folder)?;
         let mut temporary = tempfile::NamedTempFile::new_in(folder)?;
+        temporary.write_all(blake3::hash(&data).as_bytes())?;
         temporary.write_all(&data)?;
         temporary.persist(file)?;
         Ok(())
@@ -366,6 +367,12 @@ impl Drop for Pipelines {
             raw.destroy_pipeline_cache(self.cache, None);
         }
     }
+}
+
+/// The driver's data in a cache file, which starts with its checksum: a driver may crash on data it did not write.
+fn undamaged(file: Vec<u8>) -> Option<Vec<u8>> {
+    let (checksum, data) = file.split_first_chunk::<{ blake3::OUT_LEN }>()?;
+    (blake3::hash(data) == *checksum).then(|| data.to_vec())
 }
 
 pub(super) fn stage_flags(program: &Program) -> vk::ShaderStageFlags {

@@ -164,9 +164,9 @@ impl<'c> Recorder<'c> {
     pub fn dispatch_indirect<P: Pass>(&mut self, pass: &P, groups: &Buffer<u32>, index: usize) {
         let mut bindings = Bindings::default();
         pass.bind(&mut bindings);
-        if index + 3 > groups.len() {
-            let message = format!("{}: indirect group count {index} of {}", P::PROGRAM.name, groups.len());
-            return self.fail(GpuError::Shader(message));
+        if index.checked_add(3).is_none_or(|end| end > groups.len()) {
+            let message = format!("{}: indirect group counts at {index} of {}", P::PROGRAM.name, groups.len());
+            return self.fail(GpuError::Refused(message));
         }
         let access = Access { id: groups.id(), reads: true, writes: false };
         let raw = groups.raw();
@@ -186,7 +186,7 @@ impl<'c> Recorder<'c> {
             target.color.iter().map(|(image, _)| Access { id: image.id(), reads: true, writes: true }).collect();
         attachments.extend(target.depth.iter().map(|(image, ..)| Access { id: image.id(), reads: true, writes: true }));
         let Some((width, height)) = target.extent() else {
-            return self.fail(GpuError::Shader(format!("{}: nothing to draw into", P::PROGRAM.name)));
+            return self.fail(GpuError::Refused(format!("{}: nothing to draw into", P::PROGRAM.name)));
         };
         let color: Vec<_> = target.color.iter().map(|(image, _)| image.format).collect();
         let depth = target.depth.map(|(image, ..)| image.format);
@@ -247,7 +247,7 @@ impl<'c> Recorder<'c> {
             ),
         };
         if groups.iter().any(|&g| g > limit) {
-            return Err(GpuError::Shader(format!(
+            return Err(GpuError::Refused(format!(
                 "{}: {groups:?} workgroups, this device allows {limit}",
                 program.name
             )));

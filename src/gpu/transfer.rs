@@ -119,10 +119,10 @@ impl Recorder<'_> {
         if data.is_empty() {
             return;
         }
-        if first + data.len() > buffer.len() {
+        if first.checked_add(data.len()).is_none_or(|end| end > buffer.len()) {
             let message =
                 format!("`{}`: write of {} elements at {first} into {}", buffer.name(), data.len(), buffer.len());
-            return self.fail(GpuError::Shader(message));
+            return self.fail(GpuError::Refused(message));
         }
         let bytes: &[u8] = bytemuck::cast_slice(data);
         match self.stage(bytes) {
@@ -164,7 +164,7 @@ impl Recorder<'_> {
         if source.len() > target.len() {
             let message =
                 format!("copy of `{}` ({}) into `{}` ({})", source.name(), source.len(), target.name(), target.len());
-            return self.fail(GpuError::Shader(message));
+            return self.fail(GpuError::Refused(message));
         }
         self.copy_raw(
             "transfer/copy",
@@ -183,7 +183,7 @@ impl Recorder<'_> {
         if bytes.len() as u64 != expected || layer >= image.layers {
             let message =
                 format!("image `{}` layer {layer}: {} bytes given, {expected} wanted", image.name(), bytes.len());
-            return self.fail(GpuError::Shader(message));
+            return self.fail(GpuError::Refused(message));
         }
         let staging = match self.stage(bytes) {
             Ok(staging) => staging,

@@ -1,8 +1,6 @@
-//! The GPU layer itself: transfers, scans of awkward sizes, hazards, limits, and that validation is really listening.
+//! Small transfers, scans of awkward sizes, hazards, records, limits, memory by owner, the choice of a device.
 
-mod common;
-
-use common::{Random, TestContext};
+use crate::common::{Random, TestContext};
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
 use linklight::gpu::{Context, Format, GpuError, ImageDescription, Options, Shape};
 use linklight::stages::scan;
@@ -110,6 +108,10 @@ fn a_missing_barrier_is_reported_and_a_right_one_is_silent() {
     assert!(
         planted.iter().any(|m| m.to_lowercase().contains("hazard")),
         "validation must report the planted hazard, said {planted:?}"
+    );
+    assert!(
+        planted.iter().any(|m| m.contains("test/values")),
+        "the message must call the buffer by its name, said {planted:?}"
     );
     assert_eq!(dependent_dispatches(Options::default()), Vec::<String>::new());
     assert_eq!(dependent_dispatches(Options { full_barriers: true, ..Options::default() }), Vec::<String>::new());

@@ -1,0 +1,11 @@
+//! The GPU layer itself: transfers, scans, hazards, limits, errors, and that validation is really listening.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod basics;
+mod errors;
+mod images;
+mod passes;
+mod pipeline_cache;
+mod transfers;

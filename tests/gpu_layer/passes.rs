@@ -1,0 +1,113 @@
+//! Ways to run a pass: indirect dispatch, draws of nothing, devices without any optional feature.
+
+use crate::common::scenes::{lambert, scene};
+use crate::common::{Random, TestContext};
+use glam::Vec3;
+use linklight::gpu::shaders::display::{ShadowMap, ShadowMapParams};
+use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
+use linklight::gpu::{
+    Context, Format, Image, ImageDescription, Load, OptionalFeatures, Options, RasterState, Shape, Target,
+};
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::pose::Pose;
+use linklight::stages::scan;
+use linklight::stages::world::World;
+
+#[test]
+fn an_indirect_dispatch_runs_the_groups_an_earlier_pass_left() {
+    let context = TestContext::new();
+    let values = context.upload("test/values", &[0u32; 1000]).unwrap();
+    let block_sums = context.upload("test/block sums", &[7u32]).unwrap();
+    let groups = context.upload("test/groups", &[9u32, 9, 9, 0, 0, 0]).unwrap();
+    let pass =
+        AddBlockSums { values: &values, block_sums: &block_sums, params: AddBlockSumsParams { value_count: 1000 } };
+    let mut recorder = context.recorder("test").unwrap();
+    recorder.write(&groups, 3, &[2u32, 1, 1]);
+    recorder.dispatch_indirect(&pass, &groups, 3);
+    recorder.submit().unwrap();
+    // Two workgroups of 256 threads.
+    let expected: Vec<u32> = (0..1000).map(|i| if i < 512 { 7 } else { 0 }).collect();
+    assert_eq!(context.download(&values).unwrap(), expected);
+
+    for index in [4, usize::MAX] {
+        let mut recorder = context.recorder("test").unwrap();
+        recorder.dispatch_indirect(&pass, &groups, index);
+        let message = recorder.submit().unwrap_err().to_string();
+        assert!(message.contains("scan/add_block_sums") && message.contains("of 6"), "{message}");
+    }
+    assert_eq!(context.download(&values).unwrap(), expected, "nothing ran");
+}
+
+fn empty_world(context: &Context) -> World {
+    let scene = scene(vec![lambert(Vec3::ONE)], vec![], &[]);
+    let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+    World::new(context, &scene, &geometry, &Pose::rest(&scene), &Environment::default(), false).unwrap()
+}
+
+fn depth_image(context: &Context) -> Image {
+    let description = ImageDescription {
+        name: "test/depth",
+        width: 5,
+        height: 3,
+        layers: 2,
+        mip_levels: 1,
+        format: Format::Depth32,
+        shape: Shape::Array,
+    };
+    context.image(&description).unwrap()
+}
+
+#[test]
+fn a_draw_of_nothing_still_clears() {
+    let context = TestContext::new();
+    let world = empty_world(&context);
+    let shadow_views = context.buffer("test/views", 1).unwrap();
+    let depth = depth_image(&context);
+    let pass = ShadowMap {
+        triangles: &world.triangles,
+        positions: &world.positions,
+        attributes: &world.attributes,
+        shadow_views: &shadow_views,
+        triangle_materials: &world.triangle_materials,
+        materials: &world.materials,
+        textures: &world.textures,
+        params: ShadowMapParams { view: 0 },
+    };
+    let state = RasterState { depth_test: true, ..RasterState::default() };
+    let target = |layer, load| Target { color: vec![], depth: Some((&depth, layer, load)) };
+    let mut recorder = context.recorder("test").unwrap();
+    recorder.draw(&pass, &target(0, Load::Clear([0.25; 4])), state, 0, 1);
+    recorder.draw(&pass, &target(1, Load::Clear([0.75; 4])), state, 3, 0);
+    recorder.draw(&pass, &target(1, Load::Keep), state, 0, 0);
+    recorder.submit().unwrap();
+    assert_eq!(context.download_image::<f32>(&depth, 0).unwrap(), [0.25; 15]);
+    assert_eq!(context.download_image::<f32>(&depth, 1).unwrap(), [0.75; 15]);
+
+    let mut recorder = context.recorder("test").unwrap();
+    recorder.draw(&pass, &Target { color: vec![], depth: None }, state, 3, 1);
+    let message = recorder.submit().unwrap_err().to_string();
+    assert!(message.contains("display/shadow_map") && message.contains("nothing to draw into"), "{message}");
+}
+
+#[test]
+fn a_device_without_optional_features_does_the_same_work() {
+    let data: Vec<u32> = {
+        let mut random = Random(2);
+        (0..5000).map(|_| random.below(10)).collect()
+    };
+    let scanned = |options: Options| {
+        let context = TestContext::with(options);
+        let values = context.upload("test/values", &data).unwrap();
+        let scratch = scan::ScanScratch::new(&context, "test", data.len()).unwrap();
+        let mut recorder = context.recorder("test").unwrap();
+        scan::exclusive(&mut recorder, &values, data.len(), &scratch);
+        recorder.submit().unwrap();
+        (context.features(), context.calibrate().is_some(), context.download(&values).unwrap())
+    };
+    let (features, calibrated, bare) =
+        scanned(Options { no_optional_features: true, statistics: true, ..Options::default() });
+    assert_eq!((features, calibrated), (OptionalFeatures::default(), false));
+    let (_, _, full) = scanned(Options { statistics: true, ..Options::default() });
+    assert!(bare == full, "the same numbers");
+}
