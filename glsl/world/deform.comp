@@ -19,6 +19,14 @@ layout(set = 0, binding = 8, scalar) writeonly buffer Normals { vec3 normals[]; 
 layout(set = 0, binding = 9, scalar) writeonly buffer Tangents { vec4 tangents[]; };
 layout(push_constant, scalar) uniform Params { uint vertex_count; } params;
 
+// Largest entry 1, so that products of small or large scales stay within what floats hold.
+mat3 scaled(mat3 m)
+{
+    vec3 size = max(abs(m[0]), max(abs(m[1]), abs(m[2])));
+    float largest = max(size.x, max(size.y, size.z));
+    return largest > 0.0 ? m / largest : m;
+}
+
 // Inverse transpose up to a positive factor, by cofactors: defined for singular matrices too.
 mat3 normal_matrix(mat3 m)
 {
@@ -51,8 +59,9 @@ void main()
         world = mat4x3(0.0);
         for (uint k = 0; k < 8; ++k)
             if (influence.weights[k] != 0.0) world += palette[influence.joints[k]] * influence.weights[k];
-        normal_world = normal_matrix(mat3(world));
-        mirror = dot(world[0], cross(world[1], world[2])) < 0.0 ? -1.0 : 1.0;
+        mat3 linear = scaled(mat3(world));
+        normal_world = normal_matrix(linear);
+        mirror = determinant(linear) < 0.0 ? -1.0 : 1.0;
     }
 
     positions[v] = world * vec4(position, 1.0);

@@ -103,12 +103,12 @@ impl<'c> Capture<'c> {
 
     /// The frame ends: the capture appears at the target, whole.
     pub fn finish(mut self) -> Result<(), CaptureError> {
-        let refuse = |reason: String| CaptureError::Write { path: self.target.clone(), reason };
         let before = self.renderdoc.get_num_captures();
         self.end();
         let count = self.renderdoc.get_num_captures();
         // RenderDoc puts a number after the name.
         let written = (count > before).then(|| self.renderdoc.get_capture(count - 1)).flatten();
+        let refuse = |reason: String| CaptureError::Write { path: self.target.clone(), reason };
         let Some((written, _)) = written else {
             return Err(refuse(
                 "RenderDoc took no capture; its log in the folder RenderDoc of the temporary folder says why".into(),

@@ -1,0 +1,12 @@
+//! Kernels against their twins: plain CPU code over plain slices in binding order, with the kernel's order of
+//! statements. Inputs come from twins of earlier stages, so that one broken kernel fails one test.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod compare;
+mod deform;
+mod environment_irradiance;
+mod g_buffer;
+mod materials;
+mod punctual_irradiance;
