@@ -44,7 +44,8 @@ const MASK: u32 = 8;
 /// A texture whose red follows u and green v, and one whose alpha is a checker of 8 x 8.
 fn textures(scene: &mut Scene) {
     let ramp = (0..RAMP * RAMP).flat_map(|i| [(i % RAMP * 8) as u8, (i / RAMP * 8) as u8, 128, 255]);
-    let mask = (0..MASK * MASK).flat_map(|i| [255, 255, 255, if (i % MASK + i / MASK) % 2 == 0 { 255 } else { 0 }]);
+    let mask =
+        (0..MASK * MASK).flat_map(|i| [255, 255, 255, if (i % MASK + i / MASK).is_multiple_of(2) { 255 } else { 0 }]);
     let image = |name: &str, side, rgba| Image { name: name.into(), width: side, height: side, rgba, srgb: false };
     scene.images = vec![image("ramp", RAMP, ramp.collect()), image("mask", MASK, mask.collect())];
     let texture = |image, linear| Texture {
@@ -164,7 +165,7 @@ impl Caster<'_> {
             }
             Some(_) => {
                 let at = (uv * MASK as f32).as_uvec2().min(UVec2::splat(MASK - 1));
-                color * Vec4::new(1.0, 1.0, 1.0, if (at.x + at.y) % 2 == 0 { 1.0 } else { 0.0 })
+                color * Vec4::new(1.0, 1.0, 1.0, if (at.x + at.y).is_multiple_of(2) { 1.0 } else { 0.0 })
             }
         }
     }
