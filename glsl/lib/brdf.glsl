@@ -105,12 +105,12 @@ vec3 visible_normal(vec3 eye, float alpha, vec2 u)
 
 // A direction for light to come from, in proportion to the reflected radiance, nearly. It may lie below the plane of
 // the normal, where nothing is reflected.
-vec3 brdf_sample(Surface s, vec3 to_eye, vec3 u)
+vec3 brdf_sample(Surface s, vec3 to_eye, float lobe, vec2 u)
 {
     to_eye = folded_eye(s.normal, to_eye);
     mat3 basis = basis_of(s.normal);
-    if (u.x >= specular_share(s, dot(s.normal, to_eye))) return basis * cosine_hemisphere(u.yz);
-    vec3 halfway = basis * visible_normal(to_eye * basis, s.alpha, u.yz);
+    if (lobe >= specular_share(s, dot(s.normal, to_eye))) return basis * cosine_hemisphere(u);
+    vec3 halfway = basis * visible_normal(to_eye * basis, s.alpha, u);
     return 2.0 * dot(to_eye, halfway) * halfway - to_eye;
 }
 #endif

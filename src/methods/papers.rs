@@ -53,6 +53,14 @@ pub const PAPERS: &[Paper] = &[
         doi: None,
     },
     Paper {
+        key: "Burley2020",
+        title: "Practical Hash-based Owen Scrambling",
+        authors: "Brent Burley",
+        year: 2020,
+        venue: "Journal of Computer Graphics Techniques 9(4)",
+        doi: None,
+    },
+    Paper {
         key: "Chao1982",
         title: "A General Purpose Unequal Probability Sampling Plan",
         authors: "Min-Te Chao",
@@ -161,7 +169,7 @@ pub const PAPERS: &[Paper] = &[
     Paper {
         key: "Waechter2019",
         title: "A Fast and Robust Method for Avoiding Self-Intersection",
-        authors: "Carsten W\u{e4}chter, Nikolaus Binder",
+        authors: "Carsten Waechter, Nikolaus Binder",
         year: 2019,
         venue: "Ray Tracing Gems",
         doi: Some("10.1007/978-1-4842-4427-2_6"),

@@ -3,4 +3,5 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod physics;
+mod references;
 mod render;

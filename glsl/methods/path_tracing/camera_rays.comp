@@ -19,7 +19,7 @@ void main()
     if (i >= params.batch.path_count) return;
 
     uint pixel = pixel_of(params.batch, i);
-    vec4 u = random4(pixel, sample_of(params.batch, i), CAMERA_DIMENSION, params.batch.seed);
+    vec4 u = unit_interval(sample_words(pixel, sample_of(params.batch, i), CAMERA_DIMENSION, params.batch.seed));
     vec2 corner = vec2(pixel % params.size.x, pixel / params.size.x);
     rays[i] = view_ray(params.view, corner + u.xy, params.size);
     paths[i].throughput = vec3(1.0);

@@ -144,17 +144,17 @@ void main()
     if (vertex.reflects == 0) return;
 
     uint pixel = pixel_of(params.batch, i), sample_index = sample_of(params.batch, i);
-    uint dimension = vertex_dimension(params.depth);
-    vec4 choose = random4(pixel, sample_index, dimension, params.batch.seed);
-    uvec4 words = pcg4d(uvec4(pixel, sample_index, dimension + 1, params.batch.seed));
-    vec2 inside = vec2(words.xy >> 8u) * (1.0 / 16777216.0);
+    uvec4 words = sample_words(pixel, sample_index, light_dimension(params.depth), params.batch.seed);
+    vec2 inside = unit_interval(words.xy), which = unit_interval(words.zw);
+    uvec4 further = sample_words(pixel, sample_index, reflection_dimension(params.depth), params.batch.seed);
+    float kind = unit_interval(further.w);
     vec3 origin = vertex.position + vertex.offset * vertex.geometric_normal;
 
     LightSample light;
     LightChoice choice = params.choice;
-    if (choose.x < choice.emitters) light = emitter_sample(origin, words.z, choose.y, inside);
-    else if (choose.x < choice.emitters + choice.environment) light = environment_light(choose.yz, inside);
-    else light = punctual_sample(origin, vertex.normal, choose.y);
+    if (kind < choice.emitters) light = emitter_sample(origin, words.z, which.y, inside);
+    else if (kind < choice.emitters + choice.environment) light = environment_light(which, inside);
+    else light = punctual_sample(origin, vertex.normal, which.x);
     if (light.value == vec3(0.0) || dot(vertex.geometric_normal, light.direction) <= 0.0) return;
 
     Surface s = surface_at(vertex);

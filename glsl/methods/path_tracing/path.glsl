@@ -47,9 +47,11 @@ struct Batch {
 uint pixel_of(Batch batch, uint path) { return batch.first_pixel + path % batch.pixel_count; }
 uint sample_of(Batch batch, uint path) { return batch.first_sample + path / batch.pixel_count; }
 
-// Dimensions of random numbers, four in each: one for the camera, three for every vertex.
+// Dimensions of random numbers, four in each: one for the camera, and at every vertex one for the light asked (xy the
+// place on it, zw which) and one for the reflected ray (xy its direction, z the lobe; w the kind of light asked).
 const uint CAMERA_DIMENSION = 0u;
-uint vertex_dimension(uint depth) { return 1u + 3u * depth; }
+uint light_dimension(uint depth) { return 1u + 2u * depth; }
+uint reflection_dimension(uint depth) { return 2u + 2u * depth; }
 
 // How light is found: both ways with weights, by choosing lights alone, or by following reflection alone.
 const uint BY_BOTH = 0u;

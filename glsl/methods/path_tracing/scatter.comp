@@ -29,10 +29,10 @@ void main()
     rays[i].t_max = -1.0;
     if (vertex.reflects == 0) return;
 
-    uint pixel = pixel_of(params.batch, i), dimension = vertex_dimension(params.depth) + 2;
-    vec4 u = random4(pixel, sample_of(params.batch, i), dimension, params.batch.seed);
+    uint pixel = pixel_of(params.batch, i), dimension = reflection_dimension(params.depth);
+    vec4 u = unit_interval(sample_words(pixel, sample_of(params.batch, i), dimension, params.batch.seed));
     Surface s = surface_at(vertex);
-    vec3 direction = brdf_sample(s, to_eye, u.xyz);
+    vec3 direction = brdf_sample(s, to_eye, u.z, u.xy);
     float length_squared = dot(direction, direction);
     direction /= sqrt(length_squared);
     float density = brdf_density(s, to_eye, direction);

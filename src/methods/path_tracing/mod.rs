@@ -5,7 +5,7 @@
 //! bounces" means what it means for the other methods. At each surface, light is sought in two ways: one shadow ray to
 //! a light, and the reflected ray itself should it end on one; both are weighted by the power heuristic. Paths advance
 //! together, one kernel a step, in batches of bounded size. A picture is a function of its settings and the scene, to
-//! the bit: random numbers are hashes of (pixel, sample, dimension, seed), and every pixel adds its samples in order.
+//! the bit: random numbers are functions of (pixel, sample, dimension, seed), and every pixel adds its samples in order.
 //!
 //! | symbol | name | unit | where |
 //! |---|---|---|---|
