@@ -24,8 +24,8 @@ pub fn compile(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderError> {
 }
 
 /// Runs `glslc`, looked up on PATH or named by the variable GLSLC.
-#[cfg(not(feature = "shaderc"))]
-fn compile_with_command(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderError> {
+#[cfg_attr(feature = "shaderc", allow(dead_code, reason = "the build script then uses the library alone"))]
+pub fn compile_with_command(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderError> {
     let glslc = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
     let output = std::process::Command::new(&glslc)
         .args(["-O", "-g", "--target-env=vulkan1.2", "-Werror", "-I"])
@@ -56,7 +56,7 @@ fn compile_with_command(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderErro
 
 /// Calls the linked shaderc library.
 #[cfg(feature = "shaderc")]
-fn compile_with_library(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderError> {
+pub fn compile_with_library(root: &Path, file: &Path) -> Result<Vec<u32>, ShaderError> {
     let fail = |error: &dyn std::fmt::Display| ShaderError(format!("{}: {error}", file.display()));
     let source = std::fs::read_to_string(root.join(file)).map_err(|e| fail(&e))?;
     let kind = match file.extension().and_then(|e| e.to_str()) {

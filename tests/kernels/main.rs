@@ -6,6 +6,7 @@ mod common;
 
 mod compare;
 mod deform;
+mod display;
 mod environment_irradiance;
 mod g_buffer;
 mod materials;
