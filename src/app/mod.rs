@@ -14,11 +14,13 @@ pub mod console;
 pub mod devices;
 pub mod diff;
 mod error;
+mod frame;
 pub mod interrupt;
 pub mod measure;
 pub mod methods;
 pub mod output;
 pub mod render;
+mod stage;
 pub mod values;
 
 use std::io::Write;

@@ -1,21 +1,25 @@
 //! `linklight render`: the options as one typed, checked request.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::AppError;
+use super::{AppError, frame, output};
 use super::cli::{Channel, Display, Global, RenderArgs};
-use super::console::Console;
+use super::console::{Console, Verbosity};
 use super::interrupt::Interrupt;
+use super::output::Measured;
+use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
 use crate::gpu::{Context, Options};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
 use crate::report::tonemap::ToneSettings;
+use crate::report::trace::TimeLine;
 use crate::report::write::check_writable;
 use crate::scene::environment::load::EnvironmentSource;
+use crate::stages::film::Film;
 
 const DEFAULT_SPP: u32 = 64;
 
@@ -188,15 +192,51 @@ impl LightParts {
 pub fn run(
     request: &RenderRequest,
     global: &Global,
-    _console: &Console,
+    console: &Console,
     interrupt: &Interrupt,
-    _out: &mut dyn Write,
+    out: &mut dyn Write,
 ) -> Result<(), AppError> {
-    let options = Options { gpu: global.gpu.clone(), validation: global.validate, ..Options::default() };
-    let context = Context::new(options)?;
+    let time_line = TimeLine::default();
+    let options = Options {
+        gpu: global.gpu.clone(),
+        validation: global.validate,
+        statistics: request.profile.is_some(),
+        pipeline_cache: pipeline_cache(),
+        ..Options::default()
+    };
+    let context = time_line.span("open device", || Context::new(options))?;
     interrupt.check()?;
-    let device = &context.info().name;
-    Err(AppError::failed(format!("{device} is ready, but no method renders {:?} yet", request.scene)))
+    let stage = Stage::new(&context, request, &time_line)?;
+    let film = Film::new(&context, request.width, request.height)?;
+    context.take_records();
+    for number in 0..request.frames {
+        interrupt.check()?;
+        let name = format!("frame {number}");
+        time_line.span(&name, || frame::render(&context, request, &stage, &film, console, interrupt))?;
+    }
+    let records = context.take_records();
+    let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;
+    time_line.span("write picture", || output::write_picture(request, picture, context.info()))?;
+    let measured = Measured { context: &context, time_line: &time_line, records, scene: stage.facts() };
+    if global.verbosity() >= Verbosity::Detailed {
+        output::write_measurements(request, measured, out)?;
+    } else {
+        output::write_measurements(request, measured, &mut io::sink())?;
+    }
+    let messages = context.validation_messages();
+    match messages.first() {
+        None => Ok(()),
+        Some(first) => Err(AppError::failed(format!("validation reported {} messages, the first: {first}", messages.len()))),
+    }
+}
+
+/// Where the driver's compiled pipelines are kept between runs: the user's cache folder, where there is one.
+fn pipeline_cache() -> Option<PathBuf> {
+    let folder = std::env::var_os("XDG_CACHE_HOME")
+        .map(PathBuf::from)
+        .or_else(|| std::env::var_os("LOCALAPPDATA").map(PathBuf::from))
+        .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))?;
+    folder.is_absolute().then(|| folder.join("linklight").join("pipelines.bin"))
 }
 
 #[cfg(test)]

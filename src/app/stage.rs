@@ -1,0 +1,106 @@
+//! Before the first frame: the scene loaded, tessellated, posed, placed on the device, with its hierarchy and view.
+
+use glam::{UVec2, Vec3};
+
+use super::AppError;
+use super::render::RenderRequest;
+use super::values::SceneSource;
+use crate::gpu::Context;
+use crate::report::profile::SceneFacts;
+use crate::report::trace::TimeLine;
+use crate::scene::camera::View;
+use crate::scene::environment::load::{self as environment, EnvironmentLimits, EnvironmentSource};
+use crate::scene::geometry::Geometry;
+use crate::scene::pose::Pose;
+use crate::scene::tessellate::{Fineness, tessellate};
+use crate::scene::{LoadOptions, Scene, animation, builtin, deform};
+use crate::stages::bvh::Bvh;
+use crate::stages::world::World;
+
+/// Host memory that a scene and what is computed from it may take, bytes.
+const MAX_MEMORY_BYTES: u64 = 8 << 30;
+/// Elements that methods solving on elements aim at where nothing else is asked for.
+const DEFAULT_ELEMENTS: u32 = 20_000;
+
+/// Everything a frame starts from.
+pub struct Stage {
+    pub scene: Scene,
+    pub geometry: Geometry,
+    pub pose: Pose,
+    /// World-space corners of the posed scene.
+    pub bounds: [Vec3; 2],
+    pub view: View,
+    pub world: World,
+    pub bvh: Bvh,
+}
+
+impl Stage {
+    /// Loads and places what `request` asks for. What was skipped or repaired on the way is logged.
+    pub fn new(context: &Context, request: &RenderRequest, time_line: &TimeLine) -> Result<Self, AppError> {
+        let scene = time_line.span("load scene", || load_scene(&request.scene))?;
+        let dark = EnvironmentSource::Constant(Vec3::ZERO);
+        let environment = request.environment.as_ref().unwrap_or(&dark);
+        let environment = time_line
+            .span("load environment", || environment::load(environment, 0.0, &EnvironmentLimits::default()))
+            .map_err(AppError::failed)?;
+        let notes = scene.notes.iter().cloned().chain(environment.notes).chain(animation::unplayed_channels(&scene));
+        notes.for_each(|note| tracing::info!("{note}"));
+
+        let geometry = time_line.span("tessellate", || flatten(&scene, request))?;
+        if geometry.triangle_count() == 0 {
+            return Err(AppError::failed(format!("the scene {:?} has no triangles to render", scene.name)));
+        }
+        let pose = Pose::at(&scene, request.seconds);
+        let vertices = time_line.span("place vertices", || deform::world_vertices(&geometry, &pose));
+        let bounds = vertices.bounds().filter(|[low, high]| low.is_finite() && high.is_finite());
+        let Some(bounds) = bounds else {
+            return Err(AppError::failed(format!("at {} s no vertex of the scene is at a finite place", pose.seconds)));
+        };
+        let size = UVec2::new(request.width, request.height);
+        let camera = request.camera.as_ref().map(|camera| camera.name.as_str());
+        let view = View::of_scene(&scene, &pose, camera, Some(bounds), size).map_err(AppError::failed)?;
+        let bvh = time_line
+            .span("build hierarchy", || Bvh::build(context, &vertices.positions, &geometry.triangles))
+            .map_err(AppError::failed)?;
+        let world = time_line.span("upload", || {
+            World::new(context, &scene, &geometry, &pose, &environment.environment, request.diffuse)
+        })?;
+        tracing::debug!(
+            "{} elements, {} triangles, {} lights",
+            geometry.vertex_count(),
+            geometry.triangle_count(),
+            pose.lights.len()
+        );
+        Ok(Self { scene, geometry, pose, bounds, view, world, bvh })
+    }
+
+    /// What was rendered, in numbers.
+    pub fn facts(&self) -> SceneFacts {
+        SceneFacts {
+            name: self.scene.name.clone(),
+            triangles: self.geometry.triangle_count().into(),
+            elements: self.geometry.vertex_count().into(),
+            lights: self.pose.lights.len() as u64,
+        }
+    }
+}
+
+fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
+    let options = LoadOptions { max_memory_bytes: MAX_MEMORY_BYTES, ..LoadOptions::default() };
+    match source {
+        SceneSource::File(path) => crate::scene::load(path, &options).map_err(AppError::failed),
+        SceneSource::Builtin(name) => match builtin::resolve(name).map_err(AppError::failed)? {
+            builtin::Source::File(bytes) => crate::scene::load_bytes(name, bytes).map_err(AppError::failed),
+        },
+    }
+}
+
+/// The scene as one list of triangles, cut as fine as the request asks. A method with elements needs some by default.
+fn flatten(scene: &Scene, request: &RenderRequest) -> Result<Geometry, AppError> {
+    let geometry = Geometry::flatten(scene, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
+    let default = request.display.is_some().then_some(DEFAULT_ELEMENTS);
+    let Some(target) = request.elements.or(default) else { return Ok(geometry) };
+    let rest = Pose::rest(scene);
+    let cut = tessellate(geometry, &rest, Fineness::Elements(target), MAX_MEMORY_BYTES).map_err(AppError::failed)?;
+    Ok(cut.geometry)
+}
