@@ -1,12 +1,12 @@
 //! The frame: from a staged scene to a film, by the method that was asked for.
 
 use super::AppError;
+use super::cli::Channel;
 use super::console::Console;
 use super::interrupt::Interrupt;
+use super::render::LightParts;
 use super::render::RenderRequest;
 use super::stage::Stage;
-use super::cli::Channel;
-use super::render::LightParts;
 use crate::gpu::Context;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;

@@ -5,13 +5,13 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::{AppError, frame, output};
 use super::cli::{Channel, Display, Global, RenderArgs};
 use super::console::{Console, Verbosity};
 use super::interrupt::Interrupt;
 use super::output::Measured;
 use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
+use super::{AppError, frame, output};
 use crate::gpu::{Context, Options};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
@@ -226,7 +226,9 @@ pub fn run(
     let messages = context.validation_messages();
     match messages.first() {
         None => Ok(()),
-        Some(first) => Err(AppError::failed(format!("validation reported {} messages, the first: {first}", messages.len()))),
+        Some(first) => {
+            Err(AppError::failed(format!("validation reported {} messages, the first: {first}", messages.len())))
+        }
     }
 }
 

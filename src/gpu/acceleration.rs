@@ -26,7 +26,8 @@ pub struct AccelerationStructure {
 
 struct Level {
     raw: vk::AccelerationStructureKHR,
-    storage: RawBuffer,
+    // Holds the structure's memory.
+    _storage: RawBuffer,
     bytes: u64,
     device: Arc<Device>,
 }
@@ -129,7 +130,7 @@ impl Context {
                     .create_acceleration_structure(&info, None)
                     .checked("vkCreateAccelerationStructureKHR", name)?;
                 device.set_name(raw, name);
-                Ok((Level { raw, storage, bytes, device: device.clone() }, sizes.build_scratch_size))
+                Ok((Level { raw, _storage: storage, bytes, device: device.clone() }, sizes.build_scratch_size))
             }
         };
         let geometry = triangles(device, positions.raw(), indices.raw(), vertex_count);
@@ -207,10 +208,9 @@ impl Recorder<'_> {
                     .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch_address });
                 let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
                 // SAFETY: target and scratch were sized for this geometry; inputs are alive.
-                unsafe { extension.cmd_build_acceleration_structures(recorder.raw_commands(), &[build], &[&range]) };
+                unsafe { extension.cmd_build_acceleration_structures(recorder.commands(), &[build], &[&range]) };
             });
         }
-        let _ = &structure.bottom.storage;
     }
 }
 

@@ -26,6 +26,7 @@ pub mod reflection;
 mod reload;
 mod selection;
 pub mod shader_compiler;
+mod submission;
 mod transfer;
 
 /// Passes and buffer structs made from the shaders by the build script.

@@ -1,13 +1,12 @@
 //! The recorder: every pass is labelled, timed, counted and synchronised here, in one place, always.
 
 use super::context::Context;
-use super::device::lock;
 use super::error::{Checked, GpuError};
 use super::hazards::{Access, Hazards};
 use super::image::Image;
 use super::pass::{Bindings, Handle, Pass, Program};
 use super::pipelines::{Bound, RasterState, descriptor_type, stage_flags};
-use super::profiler::{Cost, PassRecord};
+use super::profiler::Cost;
 use super::{Buffer, RawBuffer};
 use ash::vk;
 use std::fmt::Display;
@@ -68,24 +67,26 @@ pub(super) struct CommandSlot {
     pub statistics: Vec<vk::QueryPool>,
 }
 
-struct Timed {
-    path: String,
-    name: &'static str,
-    cost: Cost,
-    threads: u64,
-    overlapped: bool,
-    is_compute: Option<bool>,
+/// A pass that was recorded, waiting for its times.
+pub(super) struct Timed {
+    pub path: String,
+    pub name: &'static str,
+    pub cost: Cost,
+    pub threads: u64,
+    pub overlapped: bool,
+    /// `None` for transfers, which no pipeline statistics count.
+    pub is_compute: Option<bool>,
 }
 
 /// Records one command buffer and submits it. The first error is kept and returned by [`Recorder::submit`].
 pub struct Recorder<'c> {
-    context: &'c Context,
-    slot: Option<CommandSlot>,
-    scopes: Vec<String>,
-    timed: Vec<Timed>,
+    pub(super) context: &'c Context,
+    pub(super) slot: Option<CommandSlot>,
+    pub(super) scopes: Vec<String>,
+    pub(super) timed: Vec<Timed>,
     hazards: Hazards,
-    staging: Vec<RawBuffer>,
-    error: Option<GpuError>,
+    pub(super) staging: Vec<RawBuffer>,
+    pub(super) error: Option<GpuError>,
 }
 
 impl<'c> Recorder<'c> {
@@ -113,7 +114,7 @@ impl<'c> Recorder<'c> {
         Ok(recorder)
     }
 
-    fn commands(&self) -> vk::CommandBuffer {
+    pub(super) fn commands(&self) -> vk::CommandBuffer {
         self.slot.as_ref().map_or(vk::CommandBuffer::null(), |s| s.commands)
     }
 
@@ -154,7 +155,7 @@ impl<'c> Recorder<'c> {
             Ok(None) => return,
             Err(error) => return self.fail(error),
         };
-        self.compute(P::PROGRAM, &bindings, cost, count, |device, commands| {
+        self.compute(P::PROGRAM, &bindings, &[], cost, count, |device, commands| {
             // SAFETY: the pipeline and all its bindings are bound; the group counts are within limits.
             unsafe { device.raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]) }
         });
@@ -170,11 +171,9 @@ impl<'c> Recorder<'c> {
         }
         let access = Access { id: groups.id(), reads: true, writes: false };
         let raw = groups.raw();
-        self.run(P::PROGRAM, &bindings, &[access], None, 0, Some(true), |recorder, bound| {
-            let device = &recorder.context.device;
+        self.compute(P::PROGRAM, &bindings, &[access], None, 0, |device, commands| {
             // SAFETY: the three counts lie inside the buffer, which allows indirect use.
-            unsafe { device.raw.cmd_dispatch_indirect(recorder.commands(), raw, 4 * index as u64) };
-            let _ = bound;
+            unsafe { device.raw.cmd_dispatch_indirect(commands, raw, 4 * index as u64) }
         });
     }
 
@@ -199,7 +198,7 @@ impl<'c> Recorder<'c> {
             bytes_written: bytes(P::PROGRAM, &bindings, false) + target.size_bytes(),
         });
         let count = u64::from(vertices) * u64::from(instances);
-        self.record(P::PROGRAM, &bindings, &attachments, cost, count, bound, Some(false), |recorder| {
+        self.record(P::PROGRAM, &bindings, &attachments, cost, count, bound, |recorder| {
             let device = &recorder.context.device;
             let commands = recorder.commands();
             let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
@@ -255,34 +254,20 @@ impl<'c> Recorder<'c> {
         Ok((count > 0).then_some((groups, count)))
     }
 
+    /// Binds a compute pipeline and records `command`.
     fn compute(
-        &mut self,
-        program: &'static Program,
-        bindings: &Bindings<'_>,
-        cost: Option<Cost>,
-        count: u64,
-        run: impl FnOnce(&super::device::Device, vk::CommandBuffer),
-    ) {
-        self.run(program, bindings, &[], cost, count, Some(true), |recorder, _| {
-            run(&recorder.context.device, recorder.commands())
-        });
-    }
-
-    #[expect(clippy::too_many_arguments, reason = "the one place that every compute pass goes through")]
-    fn run(
         &mut self,
         program: &'static Program,
         bindings: &Bindings<'_>,
         extra: &[Access],
         cost: Option<Cost>,
         count: u64,
-        is_compute: Option<bool>,
-        body: impl FnOnce(&Self, Bound),
+        command: impl FnOnce(&super::device::Device, vk::CommandBuffer),
     ) {
         match self.context.pipelines.compute(program, &bindings.constants) {
-            Ok(bound) => {
-                self.record(program, bindings, extra, cost, count, bound, is_compute, |recorder| body(recorder, bound))
-            }
+            Ok(bound) => self.record(program, bindings, extra, cost, count, bound, |recorder| {
+                command(&recorder.context.device, recorder.commands());
+            }),
             Err(error) => self.fail(error),
         }
     }
@@ -297,7 +282,6 @@ impl<'c> Recorder<'c> {
         cost: Option<Cost>,
         count: u64,
         bound: Bound,
-        is_compute: Option<bool>,
         body: impl FnOnce(&Self),
     ) {
         if self.error.is_some() {
@@ -316,7 +300,7 @@ impl<'c> Recorder<'c> {
         });
         let device = self.context.device.clone();
         let commands = self.commands();
-        self.timed(program.name, &accesses, cost, count, is_compute, |recorder| {
+        self.timed(program.name, &accesses, cost, count, Some(program.is_compute()), |recorder| {
             let point =
                 if program.is_compute() { vk::PipelineBindPoint::COMPUTE } else { vk::PipelineBindPoint::GRAPHICS };
             // SAFETY: the layout was made for this program; resources are alive until the submission ends (their
@@ -418,106 +402,7 @@ impl<'c> Recorder<'c> {
     pub(super) fn context(&self) -> &'c Context {
         self.context
     }
-
-    pub(super) fn raw_commands(&self) -> vk::CommandBuffer {
-        self.commands()
-    }
-
-    /// Submits, waits until the device is done, and hands the pass records to the context.
-    pub fn submit(mut self) -> Result<(), GpuError> {
-        self.finish().map(drop)
-    }
-
-    /// As [`Self::submit`], handing back the staging buffers (read-backs) in the order they were kept.
-    pub(super) fn finish(&mut self) -> Result<Vec<RawBuffer>, GpuError> {
-        if let Some(error) = self.error.take() {
-            return Err(error);
-        }
-        let device = self.context.device.clone();
-        let commands = self.commands();
-        // Host reads of staging memory need an explicit dependency.
-        let to_host = [vk::MemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
-            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
-        let last_pass = self.timed.last().map_or_else(|| self.scopes.join("/"), |t| t.path.clone());
-        // SAFETY: the command buffer is complete; queue access is exclusive by the lock.
-        unsafe {
-            device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&to_host));
-            device.end_label(commands);
-            device.raw.end_command_buffer(commands).checked("vkEndCommandBuffer", &last_pass)?;
-            let value = {
-                let _queue = lock(&self.context.queue_lock);
-                let value = device.submitted.load(Ordering::Acquire) + 1;
-                let values = [value];
-                let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
-                let (buffers, semaphores) = ([commands], [device.timeline]);
-                let submit = vk::SubmitInfo::default()
-                    .command_buffers(&buffers)
-                    .signal_semaphores(&semaphores)
-                    .push_next(&mut timeline);
-                device
-                    .raw
-                    .queue_submit(device.queue, &[submit], vk::Fence::null())
-                    .checked("vkQueueSubmit", &last_pass)
-                    .map_err(|e| self.context.with_fault(e))?;
-                device.submitted.store(value, Ordering::Release);
-                value
-            };
-            self.context.wait(value, &last_pass)?;
-        }
-        self.collect(&last_pass)?;
-        Ok(std::mem::take(&mut self.staging))
-    }
-
-    /// Reads the queries and appends one record per pass.
-    fn collect(&mut self, last_pass: &str) -> Result<(), GpuError> {
-        let device = &self.context.device;
-        let Some(slot) = &self.slot else { return Ok(()) };
-        let period = device.limits.timestamp_period_ns;
-        let mut records = Vec::with_capacity(self.timed.len());
-        for (pool, chunk) in self.timed.chunks(PASSES_PER_POOL as usize).enumerate() {
-            let mut ticks = vec![0u64; 2 * chunk.len()];
-            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-            // SAFETY: the submission is complete and wrote each of these queries.
-            unsafe { device.raw.get_query_pool_results(slot.timestamps[pool], 0, &mut ticks, flags) }
-                .checked("vkGetQueryPoolResults", last_pass)?;
-            for (i, timed) in chunk.iter().enumerate() {
-                let mut counters = vec![("threads", timed.threads)];
-                if let (Some(&statistics), Some(is_compute)) = (slot.statistics.get(pool), timed.is_compute) {
-                    let mut counts = [[0u64; STATISTICS.len()]];
-                    // SAFETY: as above; one result of three values.
-                    unsafe { device.raw.get_query_pool_results(statistics, i as u32, &mut counts, flags) }
-                        .checked("vkGetQueryPoolResults", last_pass)?;
-                    let named = STATISTICS.iter().zip(counts[0]);
-                    counters.extend(
-                        named
-                            .filter(|((_, compute), _)| *compute == is_compute)
-                            .map(|((name, _), count)| (*name, count)),
-                    );
-                }
-                let to_ns = |ticks: u64| (ticks as f64 * period) as u64;
-                records.push(PassRecord {
-                    path: timed.path.clone(),
-                    name: timed.name,
-                    start_ns: to_ns(ticks[2 * i]),
-                    end_ns: to_ns(ticks[2 * i + 1]),
-                    bytes_read: timed.cost.bytes_read,
-                    bytes_written: timed.cost.bytes_written,
-                    counters,
-                    overlapped: timed.overlapped,
-                });
-            }
-        }
-        self.context.append_records(records);
-        Ok(())
-    }
 }
-
-/// Counter names in the order of the flag bits in [`super::context::STATISTIC_FLAGS`], and whether compute fills them.
-const STATISTICS: [(&str, bool); 3] =
-    [("clipping_primitives", false), ("fragment_invocations", false), ("compute_invocations", true)];
 
 impl Drop for Recorder<'_> {
     fn drop(&mut self) {

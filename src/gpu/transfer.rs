@@ -98,7 +98,7 @@ impl Context {
             // SAFETY: the image is alive and in GENERAL; the staging buffer holds a whole layer.
             unsafe {
                 device.raw.cmd_copy_image_to_buffer(
-                    recorder.raw_commands(),
+                    recorder.commands(),
                     image.raw(),
                     vk::ImageLayout::GENERAL,
                     staging.raw,
@@ -152,7 +152,7 @@ impl Recorder<'_> {
         let (raw, access) = (buffer.raw(), Access { id: buffer.id(), reads: false, writes: true });
         self.timed("transfer/fill", &[access], Cost { bytes_read: 0, bytes_written: bytes }, 0, None, |recorder| {
             // SAFETY: fills whole words inside the buffer.
-            unsafe { device.raw.cmd_fill_buffer(recorder.raw_commands(), raw, 0, bytes & !3, word) };
+            unsafe { device.raw.cmd_fill_buffer(recorder.commands(), raw, 0, bytes & !3, word) };
         });
     }
 
@@ -199,7 +199,7 @@ impl Recorder<'_> {
             // SAFETY: the image is alive and in GENERAL; the staging buffer holds a whole layer.
             unsafe {
                 device.raw.cmd_copy_buffer_to_image(
-                    recorder.raw_commands(),
+                    recorder.commands(),
                     staging.raw,
                     image.raw(),
                     vk::ImageLayout::GENERAL,
@@ -238,7 +238,7 @@ impl Recorder<'_> {
                 // SAFETY: both levels exist and are in GENERAL.
                 unsafe {
                     device.raw.cmd_blit_image(
-                        recorder.raw_commands(),
+                        recorder.commands(),
                         image.raw(),
                         vk::ImageLayout::GENERAL,
                         image.raw(),
@@ -265,7 +265,7 @@ impl Recorder<'_> {
         // SAFETY: the image is alive and not yet used.
         unsafe {
             device.cmd_pipeline_barrier2(
-                self.raw_commands(),
+                self.commands(),
                 &vk::DependencyInfo::default().image_memory_barriers(&barriers),
             );
         }
@@ -298,7 +298,7 @@ impl Recorder<'_> {
             // SAFETY: both ranges were checked by the callers.
             unsafe {
                 let region = vk::BufferCopy { src_offset, dst_offset, size };
-                device.raw.cmd_copy_buffer(recorder.raw_commands(), source, target, &[region]);
+                device.raw.cmd_copy_buffer(recorder.commands(), source, target, &[region]);
             }
         });
     }

@@ -1,0 +1,106 @@
+//! The end of a recording: submission, waiting, and one record per pass read from the queries.
+
+use super::buffer::RawBuffer;
+use super::device::lock;
+use super::error::{Checked, GpuError};
+use super::profiler::PassRecord;
+use super::recorder::{PASSES_PER_POOL, Recorder};
+use ash::vk;
+use std::sync::atomic::Ordering;
+
+/// Counter names in the order of the flag bits in [`super::context::STATISTIC_FLAGS`], and whether compute fills them.
+const STATISTICS: [(&str, bool); 3] =
+    [("clipping_primitives", false), ("fragment_invocations", false), ("compute_invocations", true)];
+
+impl Recorder<'_> {
+    /// Submits, waits until the device is done, and hands the pass records to the context.
+    pub fn submit(mut self) -> Result<(), GpuError> {
+        self.finish().map(drop)
+    }
+
+    /// As [`Self::submit`], handing back the staging buffers (read-backs) in the order they were kept.
+    pub(super) fn finish(&mut self) -> Result<Vec<RawBuffer>, GpuError> {
+        if let Some(error) = self.error.take() {
+            return Err(error);
+        }
+        let device = self.context.device.clone();
+        let commands = self.commands();
+        // Host reads of staging memory need an explicit dependency.
+        let to_host = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+            .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+        let last_pass = self.timed.last().map_or_else(|| self.scopes.join("/"), |t| t.path.clone());
+        // SAFETY: the command buffer is complete; queue access is exclusive by the lock.
+        unsafe {
+            device.cmd_pipeline_barrier2(commands, &vk::DependencyInfo::default().memory_barriers(&to_host));
+            device.end_label(commands);
+            device.raw.end_command_buffer(commands).checked("vkEndCommandBuffer", &last_pass)?;
+            let value = {
+                let _queue = lock(&self.context.queue_lock);
+                let value = device.submitted.load(Ordering::Acquire) + 1;
+                let values = [value];
+                let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
+                let (buffers, semaphores) = ([commands], [device.timeline]);
+                let submit = vk::SubmitInfo::default()
+                    .command_buffers(&buffers)
+                    .signal_semaphores(&semaphores)
+                    .push_next(&mut timeline);
+                device
+                    .raw
+                    .queue_submit(device.queue, &[submit], vk::Fence::null())
+                    .checked("vkQueueSubmit", &last_pass)
+                    .map_err(|e| self.context.with_fault(e))?;
+                device.submitted.store(value, Ordering::Release);
+                value
+            };
+            self.context.wait(value, &last_pass)?;
+        }
+        self.collect(&last_pass)?;
+        Ok(std::mem::take(&mut self.staging))
+    }
+
+    /// Reads the queries and appends one record per pass.
+    fn collect(&mut self, last_pass: &str) -> Result<(), GpuError> {
+        let device = &self.context.device;
+        let Some(slot) = &self.slot else { return Ok(()) };
+        let period = device.limits.timestamp_period_ns;
+        let mut records = Vec::with_capacity(self.timed.len());
+        for (pool, chunk) in self.timed.chunks(PASSES_PER_POOL as usize).enumerate() {
+            let mut ticks = vec![0u64; 2 * chunk.len()];
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            // SAFETY: the submission is complete and wrote each of these queries.
+            unsafe { device.raw.get_query_pool_results(slot.timestamps[pool], 0, &mut ticks, flags) }
+                .checked("vkGetQueryPoolResults", last_pass)?;
+            for (i, timed) in chunk.iter().enumerate() {
+                let mut counters = vec![("threads", timed.threads)];
+                if let (Some(&statistics), Some(is_compute)) = (slot.statistics.get(pool), timed.is_compute) {
+                    let mut counts = [[0u64; STATISTICS.len()]];
+                    // SAFETY: as above; one result of three values.
+                    unsafe { device.raw.get_query_pool_results(statistics, i as u32, &mut counts, flags) }
+                        .checked("vkGetQueryPoolResults", last_pass)?;
+                    let named = STATISTICS.iter().zip(counts[0]);
+                    counters.extend(
+                        named
+                            .filter(|((_, compute), _)| *compute == is_compute)
+                            .map(|((name, _), count)| (*name, count)),
+                    );
+                }
+                let to_ns = |ticks: u64| (ticks as f64 * period) as u64;
+                records.push(PassRecord {
+                    path: timed.path.clone(),
+                    name: timed.name,
+                    start_ns: to_ns(ticks[2 * i]),
+                    end_ns: to_ns(ticks[2 * i + 1]),
+                    bytes_read: timed.cost.bytes_read,
+                    bytes_written: timed.cost.bytes_written,
+                    counters,
+                    overlapped: timed.overlapped,
+                });
+            }
+        }
+        self.context.append_records(records);
+        Ok(())
+    }
+}
