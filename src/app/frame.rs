@@ -45,7 +45,7 @@ fn path_trace(
         settings: request.settings()?,
     };
     let Stage { scene, geometry, world, view, bvh, .. } = stage;
-    let tracer = Tracer::Compute(bvh);
+    let tracer = Tracer::Compute(bvh, world.into());
     let mut tracing = PathTracing::new(context, scene, geometry, world, options).map_err(AppError::failed)?;
     let progress = console.progress("path tracing", request.spp.into());
     for _ in 0..request.spp {
