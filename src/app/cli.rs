@@ -87,7 +87,7 @@ pub struct RenderArgs {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "960x540", value_parser = parse_size)]
     pub size: (u32, u32),
-    /// Samples per pixel of path-tracing [default: 64]
+    /// Samples per pixel: paths of path-tracing [default: 64], else places within the pixel [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_048_576))]
     pub spp: Option<u32>,
     /// Animation time in seconds
@@ -111,7 +111,7 @@ pub struct RenderArgs {
     /// Only light that was reflected at least once before
     #[arg(long)]
     pub indirect_only: bool,
-    /// Tessellate to about this many elements [default: as the scene is]
+    /// Tessellate to about this many elements [default: 20000; path-tracing: as the scene is]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
     pub elements: Option<u32>,
     /// Exposure in stops, for .png

@@ -2,66 +2,120 @@
 
 use super::AppError;
 use super::cli::Channel;
-use super::console::Console;
+use super::console::Progress;
 use super::interrupt::Interrupt;
-use super::render::LightParts;
-use super::render::RenderRequest;
+use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
+use crate::display::g_buffer::GBuffer;
+use crate::display::shadow_maps::ShadowMaps;
+use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
+use crate::methods::explicit_visibility::{self, ExplicitVisibility};
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
 use crate::stages::film::Film;
-use crate::stages::trace::Tracer;
 
-/// Renders one frame of `stage` into `film`.
-pub fn render(
-    context: &Context,
-    request: &RenderRequest,
-    stage: &Stage,
-    film: &Film,
-    console: &Console,
-    interrupt: &Interrupt,
-) -> Result<(), AppError> {
-    match request.method.key {
-        "path-tracing" => path_trace(context, request, stage, film, console, interrupt),
-        other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
+/// The method of a request, prepared for its scene: what stays from frame to frame.
+pub enum Method {
+    PathTracing(Box<PathTracing>),
+    ExplicitVisibility { method: Box<ExplicitVisibility>, shadow_maps: ShadowMaps, g_buffer: GBuffer },
+}
+
+/// What a method sees of a staged scene.
+fn explicit_stage(stage: &Stage) -> explicit_visibility::Stage<'_> {
+    explicit_visibility::Stage {
+        scene: &stage.scene,
+        geometry: &stage.geometry,
+        rest_positions: &stage.rest_positions,
+        environment: &stage.environment,
+        world: &stage.world,
+        tracer: stage.tracer(),
     }
 }
 
-/// Samples until there are as many as asked for, then resolves. Each submission is one sample of every pixel.
-fn path_trace(
-    context: &Context,
-    request: &RenderRequest,
-    stage: &Stage,
-    film: &Film,
-    console: &Console,
-    interrupt: &Interrupt,
-) -> Result<(), AppError> {
-    let options = Options {
-        width: request.width,
-        height: request.height,
-        bounces: request.bounces,
-        seed: request.seed,
-        settings: request.settings()?,
-    };
-    let Stage { scene, geometry, world, view, bvh, .. } = stage;
-    let tracer = Tracer::Compute(bvh, world.into());
-    let mut tracing = PathTracing::new(context, scene, geometry, world, options).map_err(AppError::failed)?;
-    let progress = console.progress("path tracing", request.spp.into());
-    for _ in 0..request.spp {
-        interrupt.check()?;
-        let mut recorder = context.recorder("path-tracing")?;
-        tracing.sample(&mut recorder, world, &tracer, view, 1);
-        recorder.submit()?;
-        progress.advance(1);
+impl Method {
+    /// Everything a method does once per scene and pose.
+    pub fn prepare(context: &Context, request: &RenderRequest, stage: &Stage) -> Result<Self, AppError> {
+        match request.method.key {
+            "path-tracing" => {
+                let options = Options {
+                    width: request.width,
+                    height: request.height,
+                    bounces: request.bounces,
+                    seed: request.seed,
+                    settings: request.settings()?,
+                };
+                let Stage { scene, geometry, world, .. } = stage;
+                let method = PathTracing::new(context, scene, geometry, world, options).map_err(AppError::failed)?;
+                Ok(Self::PathTracing(Box::new(method)))
+            }
+            "explicit-visibility" => {
+                let settings = request.settings()?;
+                let method = ExplicitVisibility::prepare(context, &explicit_stage(stage), settings);
+                let method = method.map_err(AppError::failed)?;
+                tracing::info!("{}", method.report());
+                Ok(Self::ExplicitVisibility {
+                    method: Box::new(method),
+                    shadow_maps: ShadowMaps::new(context, &stage.pose)?,
+                    g_buffer: GBuffer::new(context, request.width, request.height)?,
+                })
+            }
+            other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
+        }
     }
-    let mut recorder = context.recorder("path-tracing")?;
-    tracing.resolve(&mut recorder, film);
-    recorder.submit()?;
-    if let Some(estimate) = tracing.error_estimate(context)? {
-        tracing::info!("{estimate:?}");
+
+    /// One frame into `film`.
+    pub fn frame(
+        &mut self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        film: &Film,
+        progress: &Progress,
+        interrupt: &Interrupt,
+    ) -> Result<(), AppError> {
+        let Stage { world, view, pose, bounds, .. } = stage;
+        match self {
+            Self::PathTracing(method) => {
+                method.prepare(context, world)?;
+                // Each submission is one sample of every pixel, so that the user can interrupt between them.
+                for _ in 0..request.spp {
+                    interrupt.check()?;
+                    let mut recorder = context.recorder("path-tracing")?;
+                    method.sample(&mut recorder, world, &stage.tracer(), view, 1);
+                    recorder.submit()?;
+                    progress.advance(1);
+                }
+                let mut recorder = context.recorder("path-tracing")?;
+                method.resolve(&mut recorder, film);
+                recorder.submit()?;
+                if let Some(estimate) = method.error_estimate(context)? {
+                    tracing::info!(
+                        "standard error of the picture's mean {:.3} %, of a pixel {:.1} %",
+                        100.0 * estimate.relative_mean_error,
+                        100.0 * estimate.relative_pixel_error
+                    );
+                }
+                Ok(())
+            }
+            Self::ExplicitVisibility { method, shadow_maps, g_buffer } => {
+                let mut recorder = context.recorder("frame")?;
+                recorder.scope("explicit-visibility", |recorder| method.solve(recorder, world, request.bounces));
+                recorder.scope("display", |recorder| {
+                    let light = VertexLight {
+                        direct_irradiance: method.direct_irradiance(),
+                        indirect_irradiance: method.indirect_irradiance(),
+                        back_elements: method.back_elements(),
+                    };
+                    shadow_maps.draw(recorder, world, pose, *bounds);
+                    vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                });
+                recorder.submit()?;
+                progress.advance(u64::from(request.spp));
+                Ok(())
+            }
+        }
     }
-    Ok(())
 }
 
 /// Reads the film back: the light asked for as RGB, and the extra channels.

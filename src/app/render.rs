@@ -21,7 +21,10 @@ use crate::report::write::check_writable;
 use crate::scene::environment::load::EnvironmentSource;
 use crate::stages::film::Film;
 
+/// Samples per pixel of path-tracing: paths.
 const DEFAULT_SPP: u32 = 64;
+/// Samples per pixel of a display stage: places within the pixel, for smooth edges.
+const DEFAULT_DISPLAY_SPP: u32 = 4;
 
 /// Everything that decides a picture: options checked alone and against each other.
 #[derive(Debug, Clone)]
@@ -36,7 +39,7 @@ pub struct RenderRequest {
     /// Pixels.
     pub width: u32,
     pub height: u32,
-    /// Samples per pixel of path-tracing.
+    /// Samples per pixel: paths of path-tracing, places within the pixel of a display stage.
     pub spp: u32,
     /// Animation time.
     pub seconds: f32,
@@ -75,9 +78,6 @@ impl TryFrom<RenderArgs> for RenderRequest {
     fn try_from(args: RenderArgs) -> Result<Self, AppError> {
         let usage = |message: String| Err(AppError::Usage(message));
         let path_traced = args.method.key == "path-tracing";
-        if !path_traced && let Some(spp) = args.spp {
-            return usage(format!("--spp {spp} applies to path-tracing only; the method is {}", args.method.key));
-        }
         if path_traced && args.display.is_some() {
             return usage(
                 "--display applies to methods that solve on elements; path-tracing has pixels of its own".into(),
@@ -116,7 +116,7 @@ impl TryFrom<RenderArgs> for RenderRequest {
             bounces: args.bounces,
             width: args.size.0,
             height: args.size.1,
-            spp: args.spp.unwrap_or(DEFAULT_SPP),
+            spp: args.spp.unwrap_or(if path_traced { DEFAULT_SPP } else { DEFAULT_DISPLAY_SPP }),
             seconds: args.seconds,
             frames: args.frames,
             camera: args.camera,
@@ -165,10 +165,10 @@ impl RenderRequest {
         insert("light", self.light.name().into());
         insert("elements", json!(self.elements));
         insert("seed", self.seed.into());
-        match self.display {
-            Some(Display::Vertex) => insert("display", "vertex".into()),
-            None => insert("spp", self.spp.into()),
-        };
+        if let Some(Display::Vertex) = self.display {
+            insert("display", "vertex".into());
+        }
+        insert("spp", self.spp.into());
         if self.output.format == Format::Png {
             insert("exposure", self.tone.exposure.to_json());
             insert("tonemap", serde_json::to_value(self.tone.operator)?);
@@ -208,11 +208,12 @@ pub fn run(
     interrupt.check()?;
     let stage = Stage::new(&context, request, &time_line)?;
     let film = Film::new(&context, request.width, request.height)?;
-    context.take_records();
+    let mut method = time_line.span("prepare method", || frame::Method::prepare(&context, request, &stage))?;
+    let progress = console.progress(request.method.key, u64::from(request.spp) * u64::from(request.frames));
     for number in 0..request.frames {
         interrupt.check()?;
         let name = format!("frame {number}");
-        time_line.span(&name, || frame::render(&context, request, &stage, &film, console, interrupt))?;
+        time_line.span(&name, || method.frame(&context, request, &stage, &film, &progress, interrupt))?;
     }
     let records = context.take_records();
     let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;
@@ -270,7 +271,8 @@ mod tests {
         assert_eq!(request.settings::<explicit_visibility::Settings>().unwrap(), Default::default());
         let record = request.record().unwrap();
         assert_eq!(record["settings"]["rays_per_element"], 256);
-        assert!(!record.contains_key("spp") && !record.contains_key("exposure"), "what has no effect is not recorded");
+        assert_eq!(record["spp"], 4);
+        assert!(!record.contains_key("exposure"), "what has no effect is not recorded");
     }
 
     #[test]
@@ -295,8 +297,7 @@ mod tests {
 
     #[test]
     fn contradictions_are_refused() {
-        let cases: [(&[&str], &str); 9] = [
-            (&["--spp", "4"], "applies to path-tracing only"),
+        let cases: [(&[&str], &str); 8] = [
             (&["--method", "path-tracing", "--display", "vertex"], "pixels of its own"),
             (&["--indirect-only", "--bounces", "0"], "at least 1 bounce"),
             (&["--indirect-only", "--direct-only"], "cannot be used with"),

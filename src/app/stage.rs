@@ -9,12 +9,14 @@ use crate::gpu::Context;
 use crate::report::profile::SceneFacts;
 use crate::report::trace::TimeLine;
 use crate::scene::camera::View;
+use crate::scene::environment::Environment;
 use crate::scene::environment::load::{self as environment, EnvironmentLimits, EnvironmentSource};
 use crate::scene::geometry::Geometry;
 use crate::scene::pose::Pose;
 use crate::scene::tessellate::{Fineness, tessellate};
 use crate::scene::{LoadOptions, Scene, animation, builtin, deform};
 use crate::stages::bvh::Bvh;
+use crate::stages::trace::Tracer;
 use crate::stages::world::World;
 
 /// Host memory that a scene and what is computed from it may take, bytes.
@@ -26,6 +28,9 @@ const DEFAULT_ELEMENTS: u32 = 20_000;
 pub struct Stage {
     pub scene: Scene,
     pub geometry: Geometry,
+    /// World-space vertices at rest, bit-equal where vertices stand at one place.
+    pub rest_positions: Vec<Vec3>,
+    pub environment: Environment,
     pub pose: Pose,
     /// World-space corners of the posed scene.
     pub bounds: [Vec3; 2],
@@ -43,10 +48,15 @@ impl Stage {
         let environment = time_line
             .span("load environment", || environment::load(environment, 0.0, &EnvironmentLimits::default()))
             .map_err(AppError::failed)?;
-        let notes = scene.notes.iter().cloned().chain(environment.notes).chain(animation::unplayed_channels(&scene));
+        let notes = scene
+            .notes
+            .iter()
+            .cloned()
+            .chain(environment.notes.iter().cloned())
+            .chain(animation::unplayed_channels(&scene));
         notes.for_each(|note| tracing::info!("{note}"));
 
-        let geometry = time_line.span("tessellate", || flatten(&scene, request))?;
+        let (geometry, rest_positions) = time_line.span("tessellate", || flatten(&scene, request))?;
         if geometry.triangle_count() == 0 {
             return Err(AppError::failed(format!("the scene {:?} has no triangles to render", scene.name)));
         }
@@ -71,7 +81,13 @@ impl Stage {
             geometry.triangle_count(),
             pose.lights.len()
         );
-        Ok(Self { scene, geometry, pose, bounds, view, world, bvh })
+        let environment = environment.environment;
+        Ok(Self { scene, geometry, rest_positions, environment, pose, bounds, view, world, bvh })
+    }
+
+    /// How rays are cast at the scene.
+    pub fn tracer(&self) -> Tracer<'_> {
+        Tracer::Compute(&self.bvh, (&self.world).into())
     }
 
     /// What was rendered, in numbers.
@@ -89,18 +105,22 @@ fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
     let options = LoadOptions { max_memory_bytes: MAX_MEMORY_BYTES, ..LoadOptions::default() };
     match source {
         SceneSource::File(path) => crate::scene::load(path, &options).map_err(AppError::failed),
-        SceneSource::Builtin(name) => match builtin::resolve(name).map_err(AppError::failed)? {
-            builtin::Source::File(bytes) => crate::scene::load_bytes(name, bytes).map_err(AppError::failed),
-        },
+        SceneSource::Builtin(name) => {
+            builtin::open(&format!("{}{name}", builtin::PREFIX), &options).map_err(AppError::failed)
+        }
     }
 }
 
-/// The scene as one list of triangles, cut as fine as the request asks. A method with elements needs some by default.
-fn flatten(scene: &Scene, request: &RenderRequest) -> Result<Geometry, AppError> {
+/// The scene as one list of triangles, cut as fine as the request asks, and its vertices' places at rest. A method
+/// with elements needs some by default.
+fn flatten(scene: &Scene, request: &RenderRequest) -> Result<(Geometry, Vec<Vec3>), AppError> {
     let geometry = Geometry::flatten(scene, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
-    let default = request.display.is_some().then_some(DEFAULT_ELEMENTS);
-    let Some(target) = request.elements.or(default) else { return Ok(geometry) };
     let rest = Pose::rest(scene);
+    let default = request.display.is_some().then_some(DEFAULT_ELEMENTS);
+    let Some(target) = request.elements.or(default) else {
+        let positions = deform::world_positions(&geometry, &rest);
+        return Ok((geometry, positions));
+    };
     let cut = tessellate(geometry, &rest, Fineness::Elements(target), MAX_MEMORY_BYTES).map_err(AppError::failed)?;
-    Ok(cut.geometry)
+    Ok((cut.geometry, cut.rest_positions))
 }

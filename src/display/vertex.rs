@@ -10,7 +10,7 @@ use crate::stages::film::Film;
 use crate::stages::world::World;
 use glam::{UVec2, Vec3};
 
-/// What a method offers per vertex, W/m2.
+/// What a method offers per element, W/m2. Element `v` is the front of vertex `v`.
 #[derive(Clone, Copy)]
 pub struct VertexLight<'a> {
     /// From emitters and the environment, unreflected; punctual lights are added per pixel.
@@ -36,7 +36,7 @@ pub fn draw(
     let size = UVec2::new(film.width, film.height);
     for sample in 0..samples {
         let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
-        recorder.scope(format_args!("sample {sample}"), |recorder| {
+        recorder.scope("sample", |recorder| {
             g_buffer.draw(recorder, world, &pixel_view);
             let pass = Vertex {
                 visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),

@@ -6,6 +6,7 @@ use crate::stages::elements::{BACK_SIDE, Elements};
 use crate::stages::emitters::Emitters;
 use crate::stages::links::{Links, Outcomes};
 use serde::Serialize;
+use std::fmt;
 
 /// Counts of the last link generation and shadow rays.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -36,6 +37,24 @@ pub struct Report {
     /// Shadow rays to emitters and to punctual lights.
     pub emitter_rays: u64,
     pub light_rays: u64,
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} elements, {} rays, {} links ({:.1} raw links each, {:.1} MiB)",
+            self.elements,
+            self.rays,
+            self.links,
+            self.compression,
+            self.link_bytes as f64 / (1 << 20) as f64
+        )?;
+        match self.unresolved_elements {
+            0 => Ok(()),
+            count => write!(f, "; {count} elements inside other things take their neighbours' light"),
+        }
+    }
 }
 
 impl Report {

@@ -168,9 +168,8 @@ impl PathTracing {
                 let batch_samples = (last_sample - first_sample).min(samples_at_once);
                 let path_count = batch_samples * pixel_count;
                 let batch = Batch { path_count, pixel_count, first_pixel, first_sample, seed: self.options.seed };
-                let [end_sample, end_pixel] = [first_sample + batch_samples, first_pixel + pixel_count];
-                let label = format_args!("samples {first_sample}..{end_sample} of pixels {first_pixel}..{end_pixel}");
-                recorder.scope(label, |recorder| self.batch(recorder, world, tracer, view, batch));
+                // One label for all batches: the times of a pass add up over them.
+                recorder.scope("batch", |recorder| self.batch(recorder, world, tracer, view, batch));
             }
         }
         self.sample_count = last_sample;
