@@ -18,7 +18,14 @@ use crate::stages::film::Film;
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {
     PathTracing(Box<PathTracing>),
-    ExplicitVisibility { method: Box<ExplicitVisibility>, shadow_maps: ShadowMaps, g_buffer: GBuffer },
+    ExplicitVisibility(Box<VertexShown>),
+}
+
+/// Explicit visibility with the display stage that shows it.
+pub struct VertexShown {
+    method: ExplicitVisibility,
+    shadow_maps: ShadowMaps,
+    g_buffer: GBuffer,
 }
 
 /// What a method sees of a staged scene.
@@ -54,11 +61,9 @@ impl Method {
                 let method = ExplicitVisibility::prepare(context, &explicit_stage(stage), settings);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
-                Ok(Self::ExplicitVisibility {
-                    method: Box::new(method),
-                    shadow_maps: ShadowMaps::new(context, &stage.pose)?,
-                    g_buffer: GBuffer::new(context, request.width, request.height)?,
-                })
+                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+                let g_buffer = GBuffer::new(context, request.width, request.height)?;
+                Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer })))
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
@@ -98,7 +103,8 @@ impl Method {
                 }
                 Ok(())
             }
-            Self::ExplicitVisibility { method, shadow_maps, g_buffer } => {
+            Self::ExplicitVisibility(shown) => {
+                let VertexShown { method, shadow_maps, g_buffer } = &**shown;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("explicit-visibility", |recorder| method.solve(recorder, world, request.bounces));
                 recorder.scope("display", |recorder| {
