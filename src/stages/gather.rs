@@ -8,16 +8,6 @@ use glam::Vec3;
 
 /// `irradiance[r] = sum of weight * radiosity[sender]` over the links of every receiver `r`, W/m2.
 pub fn over_links(recorder: &mut Recorder<'_>, links: &Links, radiosity: &Buffer<Vec3>, irradiance: &Buffer<Vec3>) {
-    if let [_, _, ..] = links.windows.as_slice() {
-        recorder.overlap("windows hold different receivers", |recorder| {
-            gather_windows(recorder, links, radiosity, irradiance);
-        });
-    } else {
-        gather_windows(recorder, links, radiosity, irradiance);
-    }
-}
-
-fn gather_windows(recorder: &mut Recorder<'_>, links: &Links, radiosity: &Buffer<Vec3>, irradiance: &Buffer<Vec3>) {
     for window in &links.windows {
         let (first_element, receiver_count) = (window.first_element, window.element_count);
         let first_link = window.first_link;

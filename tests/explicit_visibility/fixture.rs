@@ -32,13 +32,13 @@ pub fn builtin_scene(name: &str) -> Scene {
 }
 
 impl Fixture {
-    /// Tessellated to edges of at most `max_edge` (metres), posed at `seconds`.
-    pub fn at(
+    /// Tessellated to edges of at most `max_edge` (metres), posed by `pose`.
+    pub fn posed(
         context: &TestContext,
         scene: Scene,
         max_edge: Option<f32>,
         environment: Environment,
-        seconds: f32,
+        pose: impl Fn(&Scene) -> Pose,
     ) -> Self {
         let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
         let rest = Pose::rest(&scene);
@@ -52,7 +52,7 @@ impl Fixture {
                 (geometry, positions)
             }
         };
-        let pose = if seconds == 0.0 { rest } else { Pose::at(&scene, seconds) };
+        let pose = pose(&scene);
         let world = World::new(context, &scene, &geometry, &pose, &environment, true).unwrap();
         let positions = context.download(&world.positions).unwrap();
         let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
@@ -63,13 +63,12 @@ impl Fixture {
     pub fn with_metals(context: &TestContext, scene: Scene) -> Self {
         let fixture = Self::new(context, scene, None);
         let pose = Pose::rest(&fixture.scene);
-        let world =
-            World::new(context, &fixture.scene, &fixture.geometry, &pose, &fixture.environment, false).unwrap();
+        let world = World::new(context, &fixture.scene, &fixture.geometry, &pose, &fixture.environment, false).unwrap();
         Self { world, ..fixture }
     }
 
     pub fn new(context: &TestContext, scene: Scene, max_edge: Option<f32>) -> Self {
-        Self::at(context, scene, max_edge, Environment::default(), 0.0)
+        Self::posed(context, scene, max_edge, Environment::default(), Pose::rest)
     }
 
     pub fn stage(&self) -> Stage<'_> {

@@ -41,7 +41,10 @@ fn rows_are_sorted_and_sum_to_the_rays_that_hit() {
             // lose half a unit, and one more where a single link holds all.
             let slack = if packed_links { 1.5 / 4096.0 } else { 1e-6 };
             let (links, least, most) = validate(&context, &method, slack);
-            println!("{name}, packed {packed_links}: {links} links, compression {:.2}, rows sum to {least}..{most}", report.compression);
+            println!(
+                "{name}, packed {packed_links}: {links} links, compression {:.2}, rows sum to {least}..{most}",
+                report.compression
+            );
             assert_eq!(report.raw_links, 3 * (report.rays - report.blocked_rays - report.escaped_rays));
             assert!(report.compression > 1.0 && report.links as usize == links);
             assert!(links * if packed_links { 4 } else { 8 } <= report.link_bytes as usize);
@@ -56,7 +59,10 @@ fn links_compress_as_in_the_paper() {
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.2));
     let method = fixture.prepare(&context, Settings::default());
     let report = method.report();
-    println!("cornell-box: {} elements, {} links of {}, compression {:.2}", report.elements, report.links, report.raw_links, report.compression);
+    println!(
+        "cornell-box: {} elements, {} links of {}, compression {:.2}",
+        report.elements, report.links, report.raw_links, report.compression
+    );
     assert!(report.compression > 2.0, "{report:?}");
 }
 

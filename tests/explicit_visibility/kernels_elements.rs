@@ -104,8 +104,7 @@ fn pointwise_passes_agree_with_their_twins() {
         let params = passes::ReflectParams { element_count: count };
         recorder.dispatch(&passes::Reflect { irradiance: &term, albedo: &sum, radiosity: &out[0], params }, count);
         let params = passes::EmittedRadiosityParams { element_count: count };
-        let pass =
-            passes::EmittedRadiosity { emission: &term, is_sampled: &flag_buffer, radiosity: &out[1], params };
+        let pass = passes::EmittedRadiosity { emission: &term, is_sampled: &flag_buffer, radiosity: &out[1], params };
         recorder.dispatch(&pass, count);
         let params = passes::AddParams { element_count: count };
         recorder.dispatch(&passes::Add { term: &term, sum: &sum, params }, count);

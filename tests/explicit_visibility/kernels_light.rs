@@ -165,12 +165,7 @@ fn emitter_passes_agree_with_their_twins() {
             triangles: &triangles,
             positions: &vertex_positions,
             rays: &rays,
-            params: passes::EmitterRaysParams {
-                first_element: 0,
-                batch_count: count,
-                sample_count,
-                ray_offset: 0.01,
-            },
+            params: passes::EmitterRaysParams { first_element: 0, batch_count: count, sample_count, ray_offset: 0.01 },
         };
         recorder.dispatch(&pass, rays.len());
         let pass = passes::PackVisibility {

@@ -98,7 +98,8 @@ fn rows_agree_with_their_twin_to_the_bit() {
     let context = TestContext::new();
     let mut random = Random(21);
     // (elements, rays, triangles, batch): few and many senders, a table filled to the brim, partial batches.
-    let cases = [(0, 16, 4, 8), (1, 16, 200, 8), (63, 64, 5, 64), (64, 144, 90, 50), (65, 256, 300, 32), (5, 1024, 3000, 2)];
+    let cases =
+        [(0, 16, 4, 8), (1, 16, 200, 8), (63, 64, 5, 64), (64, 144, 90, 50), (65, 256, 300, 32), (5, 1024, 3000, 2)];
     for (elements, ray_count, triangle_count, batch) in cases {
         let input = random_hits(&mut random, (elements * ray_count) as usize, triangle_count);
         for format in [LinkFormat::Full, LinkFormat::Packed] {

@@ -6,6 +6,7 @@ use crate::fixture::{Fixture, builtin_scene, solve};
 use glam::Vec3;
 use linklight::methods::explicit_visibility::Settings;
 use linklight::scene::environment::{Environment, EnvironmentMap};
+use linklight::scene::pose::Pose;
 use linklight::scene::{LightKind, Material};
 use std::f32::consts::PI;
 
@@ -60,8 +61,13 @@ fn an_even_sky_gives_pi_times_its_radiance() {
     let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 4, 0);
     let sky = Environment::Constant(Vec3::new(0.5, 1.0, 2.0));
     for rotate_rays in [false, true] {
-        let fixture =
-            Fixture::at(&context, scene(vec![one_sided(0.5)], vec![plane.clone()], &[]), None, sky.clone(), 0.0);
+        let fixture = Fixture::posed(
+            &context,
+            scene(vec![one_sided(0.5)], vec![plane.clone()], &[]),
+            None,
+            sky.clone(),
+            Pose::rest,
+        );
         let mut method = fixture.prepare(&context, Settings { rotate_rays, ..Settings::default() });
         let solution = solve(&context, &method, &fixture.world, 0);
         for irradiance in &solution.direct {
