@@ -59,14 +59,6 @@ impl Fixture {
         Self { scene, geometry, rest_positions, environment, world, bvh }
     }
 
-    /// As it stands, with specular lobes: albedo is base colour times (1 - metallic).
-    pub fn with_metals(context: &TestContext, scene: Scene) -> Self {
-        let fixture = Self::new(context, scene, None);
-        let pose = Pose::rest(&fixture.scene);
-        let world = World::new(context, &fixture.scene, &fixture.geometry, &pose, &fixture.environment, false).unwrap();
-        Self { world, ..fixture }
-    }
-
     pub fn new(context: &TestContext, scene: Scene, max_edge: Option<f32>) -> Self {
         Self::posed(context, scene, max_edge, Environment::default(), Pose::rest)
     }

@@ -1,16 +1,12 @@
 //! Passes over elements against their twins.
 
-use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::common::{Random, TestContext};
-use crate::fixture::Fixture;
 use crate::meshes::{COUNTS, Mesh, assert_close, points, rows, unit};
 use crate::twins;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 use linklight::gpu::shaders::elements as passes;
 use linklight::gpu::shaders::methods::explicit_visibility as method_passes;
 use linklight::gpu::shaders::types::Ray;
-use linklight::scene::Material;
-use linklight::stages::elements::{BACK_SIDE, ElementTopology, Elements};
 use std::f32::consts::PI;
 
 #[test]
@@ -159,49 +155,4 @@ fn passes_over_neighbours_agree_with_their_twins() {
         assert_close("fill_unresolved", &context.download(&device).unwrap(), &filled, 1e-6, 1e-5);
         assert!(count < 60 || filled != irradiance, "some elements are unresolved");
     }
-}
-
-/// Without textures: base colour times vertex colour, at the centre of each third around the vertex.
-#[test]
-fn materials_average_over_the_triangles_around() {
-    let context = TestContext::new();
-    let mut random = Random(15);
-    let mut sheet = parallelogram(Vec3::ZERO, Vec3::X * 2.0, Vec3::Y, 7, 0);
-    sheet.colors = sheet.colors.iter().map(|_| Vec4::from((unit(&mut random).abs(), 1.0))).collect();
-    let material = Material {
-        base_color: Vec4::new(0.9, 0.8, 0.7, 1.0),
-        metallic: 0.25,
-        emission: Vec3::new(1.0, 2.0, 3.0),
-        ..lambert(Vec3::ONE)
-    };
-    let fixture = Fixture::with_metals(&context, scene(vec![material], vec![sheet], &[]));
-    let topology = ElementTopology::new(&fixture.scene, &fixture.geometry, &fixture.rest_positions);
-    let elements = Elements::new(&context, topology, &fixture.rest_positions, &fixture.world, 1e-5).unwrap();
-    let (geometry, topology) = (&fixture.geometry, &elements.topology);
-    assert_eq!(elements.count, 128);
-    let mut albedo = Vec::new();
-    let mut areas = Vec::new();
-    for &entry in &topology.vertices {
-        let vertex = entry & !BACK_SIDE;
-        let (mut sum, mut area) = (Vec3::ZERO, 0.0);
-        for &triangle in topology.incident.row(vertex) {
-            let corners = geometry.triangles[triangle as usize];
-            let [a, b, c] = corners.map(|v| fixture.rest_positions[v as usize]);
-            let third = (b - a).cross(c - a).length() / 6.0;
-            let colour: Vec3 = corners
-                .iter()
-                .map(|&v| geometry.colors[v as usize].truncate() * if v == vertex { 22.0 } else { 7.0 } / 36.0)
-                .sum();
-            sum += third * 0.75 * Vec3::new(0.9, 0.8, 0.7) * colour;
-            area += third;
-        }
-        albedo.push(sum / area);
-        areas.push(area);
-    }
-    assert_close("albedo", &context.download(&elements.albedo).unwrap(), &albedo, 0.0, 1e-5);
-    let emission = vec![Vec3::new(1.0, 2.0, 3.0); 128];
-    assert_close("emission", &context.download(&elements.emission).unwrap(), &emission, 0.0, 1e-6);
-    let device = context.download(&elements.area).unwrap();
-    assert!(device.iter().zip(&areas).all(|(a, b)| (a - b).abs() < 1e-6), "areas");
-    assert!((device.iter().sum::<f32>() - 4.0).abs() < 1e-5, "both sides of 2 m2");
 }

@@ -1,10 +1,8 @@
-//! Twins of the light sources of glsl/elements/ and of the environment's irradiance.
+//! Twins of the light sources of glsl/elements/.
 
-use super::elements::{basis_of, element_ray, element_shift};
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use linklight::gpu::shaders::types::{EmitterSample, Light, Ray};
 use linklight::scene::adjacency::Rows;
-use linklight::scene::environment::Environment;
 use linklight::stages::elements::BACK_SIDE;
 use std::f32::consts::PI;
 
@@ -72,19 +70,6 @@ pub fn punctual_visibility(shadow_offsets: &[u32], is_free: &[u32]) -> Vec<f32> 
         rays.iter().sum::<u32>() as f32 / rays.len() as f32
     };
     shadow_offsets.windows(2).map(mean).collect()
-}
-
-pub fn punctual_irradiance(positions: &[Vec3], normals: &[Vec3], lights: &[Light], visibility: &[f32]) -> Vec<Vec3> {
-    let count = positions.len();
-    let at = |element: usize| {
-        let mut sum = Vec3::ZERO;
-        for (k, light) in lights.iter().enumerate() {
-            let (arriving, to_light, _) = light_irradiance(light, positions[element]);
-            sum += arriving * (normals[element].dot(to_light).max(0.0) * visibility[k * count + element]);
-        }
-        sum
-    };
-    (0..count).map(at).collect()
 }
 
 struct EmitterPoint {
@@ -168,26 +153,4 @@ pub fn emitter_irradiance(
         sum
     };
     (0..element_positions.len()).map(irradiance).collect()
-}
-
-pub fn environment_irradiance(
-    normals: &[Vec3],
-    escaped: &[u32],
-    environment: &Environment,
-    side: u32,
-    is_rotated: bool,
-) -> Vec<Vec3> {
-    let (ray_count, words) = (side * side, (side * side).div_ceil(32));
-    let irradiance = |element: usize| {
-        let basis = basis_of(normals[element]);
-        let shift = if is_rotated { element_shift(element as u32) } else { Vec2::ZERO };
-        let mut sum = Vec3::ZERO;
-        for ray in 0..ray_count {
-            if escaped[element * words as usize + ray as usize / 32] >> (ray % 32) & 1 == 1 {
-                sum += environment.radiance(basis * element_ray(ray, side, shift));
-            }
-        }
-        sum * (PI / ray_count as f32)
-    };
-    (0..normals.len()).map(irradiance).collect()
 }
