@@ -4,7 +4,7 @@ use std::error::Error;
 use std::io;
 
 use super::interrupt::Interrupted;
-use crate::gpu::GpuError;
+use crate::gpu::{CaptureError, GpuError};
 use crate::methods::settings::SettingError;
 use crate::report::errors::CompareError;
 use crate::report::image::PictureError;
@@ -76,4 +76,4 @@ macro_rules! failed_from {
         })*
     };
 }
-failed_from!(CompareError, FileError, PictureError, ProfileError, serde_json::Error);
+failed_from!(CaptureError, CompareError, FileError, PictureError, ProfileError, serde_json::Error);

@@ -86,13 +86,15 @@ impl Method {
                 // Each submission is one sample of every pixel, so that the user can interrupt between them.
                 for _ in 0..request.spp {
                     interrupt.check()?;
-                    let mut recorder = context.recorder("path-tracing")?;
-                    method.sample(&mut recorder, world, &stage.tracer(), view, 1);
+                    let mut recorder = context.recorder("frame")?;
+                    recorder.scope("path-tracing", |recorder| {
+                        method.sample(recorder, world, &stage.tracer(), view, 1);
+                    });
                     recorder.submit()?;
                     progress.advance(1);
                 }
-                let mut recorder = context.recorder("path-tracing")?;
-                method.resolve(&mut recorder, film);
+                let mut recorder = context.recorder("frame")?;
+                recorder.scope("path-tracing", |recorder| method.resolve(recorder, film));
                 recorder.submit()?;
                 if let Some(estimate) = method.error_estimate(context)? {
                     tracing::info!(

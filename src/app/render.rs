@@ -12,7 +12,7 @@ use super::output::Measured;
 use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
 use super::{AppError, frame, output};
-use crate::gpu::{Context, Options};
+use crate::gpu::{Capture, Context, Options, prepare_capture};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
 use crate::report::tonemap::ToneSettings;
@@ -196,6 +196,9 @@ pub fn run(
     interrupt: &Interrupt,
     out: &mut dyn Write,
 ) -> Result<(), AppError> {
+    if request.capture.is_some() {
+        prepare_capture()?;
+    }
     let time_line = TimeLine::default();
     let options = Options {
         gpu: global.gpu.clone(),
@@ -205,6 +208,7 @@ pub fn run(
         ..Options::default()
     };
     let context = time_line.span("open device", || Context::new(options))?;
+    let mut capture = request.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
     interrupt.check()?;
     let stage = Stage::new(&context, request, &time_line)?;
     let film = Film::new(&context, request.width, request.height)?;
@@ -212,8 +216,14 @@ pub fn run(
     let progress = console.progress(request.method.key, u64::from(request.spp) * u64::from(request.frames));
     for number in 0..request.frames {
         interrupt.check()?;
+        if let (Some(capture), true) = (&mut capture, number + 1 == request.frames) {
+            capture.start();
+        }
         let name = format!("frame {number}");
         time_line.span(&name, || method.frame(&context, request, &stage, &film, &progress, interrupt))?;
+    }
+    if let Some(capture) = capture {
+        time_line.span("write capture", || capture.finish())?;
     }
     let records = context.take_records();
     let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;

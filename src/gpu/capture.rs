@@ -1,13 +1,13 @@
 //! Frame captures by RenderDoc's in-application interface, of programs without a window too.
 //!
 //! RenderDoc is a Vulkan layer: it must be in the process before the instance is made. [`prepare_capture`] sees to
-//! that, [`Capture`] takes one frame. Everything between start and finish is one frame to RenderDoc, under the label
-//! `frame`. It does not touch what is rendered: under RenderDoc a device offers fewer optional features, and calls
-//! itself Vulkan 1.2.
+//! that, [`Capture`] takes one frame: everything submitted between start and finish. It does not touch what is rendered,
+//! but under RenderDoc a device offers fewer optional features, and calls itself Vulkan 1.2.
 
 use super::context::Context;
 use super::instance;
 use renderdoc::{RenderDoc, V112};
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -66,17 +66,18 @@ fn restart(command: &mut Command) -> Result<(), CaptureError> {
 
 /// Takes captures on one context.
 pub struct Capture<'c> {
-    context: &'c Context,
     renderdoc: RenderDoc<V112>,
     target: PathBuf,
     /// Where RenderDoc writes: beside the target, so that the finished file is moved there at once.
     folder: tempfile::TempDir,
     is_running: bool,
+    /// RenderDoc finds the device by itself, as long as there is one.
+    device: PhantomData<&'c Context>,
 }
 
 impl<'c> Capture<'c> {
     /// Ready to capture into `target`. Fails where RenderDoc is not in the process; see [`prepare_capture`].
-    pub fn new(context: &'c Context, target: &Path) -> Result<Self, CaptureError> {
+    pub fn new(_context: &'c Context, target: &Path) -> Result<Self, CaptureError> {
         let mut renderdoc = RenderDoc::<V112>::new().map_err(CaptureError::NotLoaded)?;
         let refuse = |reason: String| CaptureError::Write { path: target.to_owned(), reason };
         let parent = target.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -91,13 +92,12 @@ impl<'c> Capture<'c> {
             Some(text) if !text.contains('\0') => renderdoc.set_capture_file_path_template(text),
             _ => return Err(refuse("RenderDoc needs a path in UTF-8".into())),
         }
-        Ok(Self { context, renderdoc, target: target.to_owned(), folder, is_running: false })
+        Ok(Self { renderdoc, target: target.to_owned(), folder, is_running: false, device: PhantomData })
     }
 
     /// The frame begins: what is submitted from now on belongs to it.
     pub fn start(&mut self) {
         self.renderdoc.start_frame_capture(std::ptr::null(), std::ptr::null());
-        self.context.label_queue("frame");
         self.is_running = true;
     }
 
@@ -121,7 +121,6 @@ impl<'c> Capture<'c> {
 
     fn end(&mut self) {
         if std::mem::take(&mut self.is_running) {
-            self.context.unlabel_queue();
             self.renderdoc.end_frame_capture(std::ptr::null(), std::ptr::null());
         }
     }

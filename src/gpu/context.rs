@@ -196,17 +196,6 @@ impl Context {
         }
     }
 
-    /// Labels all that is submitted until [`Self::unlabel_queue`].
-    pub(super) fn label_queue(&self, name: &str) {
-        let _queue = lock(&self.queue_lock);
-        self.device.begin_queue_label(name);
-    }
-
-    pub(super) fn unlabel_queue(&self) {
-        let _queue = lock(&self.queue_lock);
-        self.device.end_queue_label();
-    }
-
     pub(super) fn append_records(&self, records: Vec<PassRecord>) {
         lock(&self.records).extend(records);
     }

@@ -215,22 +215,6 @@ impl Device {
         unsafe { debug_utils.cmd_end_debug_utils_label(commands) };
     }
 
-    /// Labels all that is submitted until [`Self::end_queue_label`].
-    pub fn begin_queue_label(&self, name: &str) {
-        let Some(debug_utils) = &self.debug_utils else { return };
-        let name = CString::new(name.replace('\0', "")).unwrap_or_default();
-        // SAFETY: the queue is alive.
-        unsafe {
-            debug_utils.queue_begin_debug_utils_label(self.queue, &vk::DebugUtilsLabelEXT::default().label_name(&name))
-        };
-    }
-
-    pub fn end_queue_label(&self) {
-        let Some(debug_utils) = &self.debug_utils else { return };
-        // SAFETY: the queue is alive and inside a label.
-        unsafe { debug_utils.queue_end_debug_utils_label(self.queue) };
-    }
-
     pub unsafe fn cmd_pipeline_barrier2(&self, commands: vk::CommandBuffer, info: &vk::DependencyInfo<'_>) {
         // SAFETY: as the caller promises for `commands` and `info`.
         unsafe {
