@@ -106,7 +106,7 @@ fn unnamed(calls: &[Call<'_>]) -> (Vec<String>, usize) {
     (without.map(|(kind, object)| format!("{kind} {object}")).collect(), count)
 }
 
-/// Work outside of a label of its own under `frame`, and the label of each piece of work.
+/// Work outside of a label of its own within that of its submission, and the labels around each piece of work.
 fn unlabelled(calls: &[Call<'_>]) -> (Vec<String>, Vec<String>) {
     const WORK: [&str; 5] = ["vkCmdDispatch", "vkCmdDraw", "vkCmdCopy", "vkCmdFill", "vkCmdBlit"];
     let (mut outside, mut labels, mut open) = (Vec::new(), Vec::new(), Vec::<&str>::new());
@@ -118,7 +118,7 @@ fn unlabelled(calls: &[Call<'_>]) -> (Vec<String>, Vec<String>) {
             }
             "vkCmdEndDebugUtilsLabelEXT" => drop(open.pop()),
             work if WORK.iter().any(|kind| work.starts_with(kind)) => match open.as_slice() {
-                ["frame", .., pass] if pass.contains('/') => labels.push(open.join(" > ")),
+                [_, .., pass] if pass.contains('/') => labels.push(open.join(" > ")),
                 _ => outside.push(format!("{work} in {open:?}")),
             },
             _ => {}
