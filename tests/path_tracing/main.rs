@@ -1,5 +1,6 @@
 //! The reference against closed forms, against itself, and against pictures made by another program.
 
+mod brdf;
 #[path = "../common/mod.rs"]
 mod common;
 mod physics;
