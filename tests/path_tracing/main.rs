@@ -3,6 +3,12 @@
 mod brdf;
 #[path = "../common/mod.rs"]
 mod common;
+mod consistency;
+mod lights;
+#[path = "../scene_data/made.rs"]
+#[allow(dead_code, reason = "shared with other tests")]
+mod made;
 mod physics;
 mod references;
 mod render;
+mod surfaces;
