@@ -53,7 +53,7 @@ macro_rules! file {
 }
 
 /// All built-in scenes, simplest first.
-pub static BUILTINS: [Builtin; 9] = [
+pub static BUILTINS: [Builtin; 11] = [
     file!("cornell-box", "the Cornell box as measured: two boxes under an area light"),
     file!("cornell-empty", "the Cornell box without its boxes"),
     file!("furnace", "closed room, albedo 0.5 and radiance 1 everywhere: after k bounces 2 - 2^-k"),
@@ -63,6 +63,8 @@ pub static BUILTINS: [Builtin; 9] = [
     file!("maze", "partitions lit only indirectly: the sun meets a wall the viewer cannot see"),
     file!("office", "sun and sky through a window, desk, shelves of books, chairs; textures"),
     file!("tea-room", "silver, copper and glazed pots on a table, arched windows, a lamp; glossy and metallic"),
+    file!("church", "a basilica: arches on columns, stained glass, sun through the clerestory, candles"),
+    file!("dancer", "a skinned dancer and a morphing blob on a stage, four seconds in a loop"),
 ];
 
 /// Finds a scene by `NAME` or `NAME?PARAMETERS` (without the prefix).

@@ -43,8 +43,9 @@ pub fn isosurface(low: Vec3, high: Vec3, cell: f32, field: impl Fn(Vec3) -> f32 
             let g = gradient(p);
             p -= g * (field(p) / g.length_squared().max(0.05));
         }
-        // A vertex that left the neighbourhood of its cell would fold the mesh.
-        let p = start + (p - start).clamp_length_max(cell);
+        // Vertices stay within their cells: the mesh cannot fold, nor two of them meet.
+        let corner = low + cell_low.as_vec3() * cell;
+        let p = p.clamp(corner + 0.2 * cell, corner + 0.8 * cell);
         Some((p, gradient(p).normalize_or(Vec3::Y)))
     };
 
@@ -80,10 +81,24 @@ pub fn isosurface(low: Vec3, high: Vec3, cell: f32, field: impl Fn(Vec3) -> f32 
             if here >= 0.0 {
                 quad.reverse();
             }
-            shape.quad_of(quad);
+            let [a, b, c, d] = quad;
+            let (one, other) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
+            let [one_worst, other_worst] =
+                [one, other].map(|pair| shape.agreement(pair[0]).min(shape.agreement(pair[1])));
+            let best = if other_worst > one_worst { other } else { one };
+            best.into_iter().for_each(|triangle| shape.triangle(triangle));
         }
     }
     shape
+}
+
+impl Shape {
+    /// How well a triangle faces the way its vertex normals say: three times the mean cosine, negative when turned over.
+    fn agreement(&self, triangle: [u32; 3]) -> f32 {
+        let [p, q, r] = triangle.map(|i| self.positions[i as usize]);
+        let normals: Vec3 = triangle.iter().map(|&i| self.normals[i as usize]).sum();
+        (q - p).cross(r - p).normalize_or_zero().dot(normals)
+    }
 }
 
 const UNIT: [UVec3; 3] = [UVec3::X, UVec3::Y, UVec3::Z];

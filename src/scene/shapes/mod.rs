@@ -115,20 +115,18 @@ impl Shape {
         self
     }
 
-    /// Vertices with the same position, normal and texture coordinate become one.
+    /// Vertices with the same position, normal and texture coordinate become one; those of no triangle go.
     pub fn welded(self) -> Self {
         let mut out = Self::default();
         let mut seen: HashMap<[u32; 8], u32> = HashMap::new();
-        let index: Vec<u32> = (0..self.positions.len())
-            .map(|i| {
-                let (p, n, t) = (self.positions[i], self.normals[i], self.uv[i]);
+        for triangle in &self.triangles {
+            let corners = triangle.map(|i| {
+                let (p, n, t) = (self.positions[i as usize], self.normals[i as usize], self.uv[i as usize]);
                 // `+ 0.0` makes negative zero positive, so that both zeros meet.
                 let key = [p.x, p.y, p.z, n.x, n.y, n.z, t.x, t.y].map(|x| (x + 0.0).to_bits());
                 *seen.entry(key).or_insert_with(|| out.vertex(p, n, t))
-            })
-            .collect();
-        for triangle in self.triangles {
-            out.triangle(triangle.map(|i| index[i as usize]));
+            });
+            out.triangle(corners);
         }
         out
     }

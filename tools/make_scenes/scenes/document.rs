@@ -1,7 +1,5 @@
 //! A glTF 2.0 document under construction, written as one .glb.
 
-#![allow(dead_code)]
-
 use glam::{Quat, Vec2, Vec3};
 use linklight::scene::shapes::Shape;
 use serde_json::{Map, Value, json};
@@ -29,6 +27,7 @@ pub struct Document {
     views: Vec<Value>,
     bytes: Vec<u8>,
     emissive_strength: bool,
+    unlit: bool,
 }
 
 /// A metallic-roughness material. Colours are linear.
@@ -44,6 +43,8 @@ pub struct Material {
     /// Texture coordinates are metres; the picture repeats every so many.
     pub texture_metres: f32,
     pub double_sided: bool,
+    /// Shown as its colour, outside light transport.
+    pub unlit: bool,
 }
 
 impl Material {
@@ -57,6 +58,7 @@ impl Material {
             emission_texture: None,
             texture_metres: 1.0,
             double_sided: false,
+            unlit: false,
         }
     }
 
@@ -142,6 +144,10 @@ impl Document {
         }
         if let Some(texture) = m.emission_texture {
             material.insert("emissiveTexture".into(), json!({ "index": texture }));
+        }
+        if m.unlit {
+            material.insert("extensions".into(), json!({ "KHR_materials_unlit": {} }));
+            self.unlit = true;
         }
         if m.double_sided {
             material.insert("doubleSided".into(), json!(true));
@@ -357,6 +363,9 @@ impl Document {
         let mut used = Vec::new();
         if self.emissive_strength {
             used.push("KHR_materials_emissive_strength");
+        }
+        if self.unlit {
+            used.push("KHR_materials_unlit");
         }
         if !self.lights.is_empty() {
             used.push("KHR_lights_punctual");
