@@ -1,6 +1,7 @@
 //! `linklight render --capture`: a frame capture that RenderDoc can open, of the same picture, with everything named.
+//! And GFXReconstruct, from outside: it changes no picture, and what it captured replays without validation messages.
 //!
-//! Needs RenderDoc; without it only its absence is tested.
+//! Needs the two tools; without RenderDoc only its absence is tested.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -34,10 +35,10 @@ fn as_xml(folder: &Path, capture: &str) -> String {
     std::fs::read_to_string(folder.join("capture.xml")).unwrap()
 }
 
-fn renderdoc_is_installed() -> bool {
-    let found = Command::new("renderdoccmd").arg("version").output().is_ok();
+fn is_installed(tool: &str, package: &str) -> bool {
+    let found = Command::new(tool).arg("--version").output().is_ok();
     if !found {
-        println!("skipped: RenderDoc is not installed (tools/setup --test installs it)");
+        println!("skipped: {tool} is not installed (package {package}; tools/setup --test installs it)");
     }
     found
 }
@@ -164,7 +165,7 @@ fn check_capture(folder: &Path, options: &str, marks: &[&str]) {
 
 #[test]
 fn a_capture_shows_the_last_frame_in_words() {
-    if !renderdoc_is_installed() {
+    if !is_installed("renderdoccmd", "renderdoc") {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
@@ -192,4 +193,29 @@ fn without_renderdoc_nothing_is_rendered_and_the_message_says_what_to_install() 
         "{message}"
     );
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is written");
+}
+
+#[test]
+fn gfxreconstruct_changes_no_picture_and_replays_without_messages() {
+    if !is_installed("gfxrecon-replay", "gfxreconstruct") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "render builtin:cornell-box --size 24x16 --elements 300 --bounces 1 --quiet -o";
+    succeed(linklight(folder.path(), &format!("{scene} plain.exr")));
+    let mut captured = linklight(folder.path(), &format!("{scene} captured.exr"));
+    captured.env("VK_INSTANCE_LAYERS", "VK_LAYER_LUNARG_gfxreconstruct").env("GFXRECON_LOG_LEVEL", "error");
+    captured.env("GFXRECON_CAPTURE_FILE", "capture.gfxr").env("GFXRECON_CAPTURE_FILE_TIMESTAMP", "false");
+    succeed(captured);
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(read("plain.exr") == read("captured.exr"), "the same bits while capturing");
+
+    let replay = Command::new("gfxrecon-replay")
+        .args(["--validate", "--log-level", "warning", "capture.gfxr"])
+        .current_dir(folder.path())
+        .output()
+        .unwrap();
+    // A program without a window presents no frames.
+    let said = text(&replay).replace("File did not contain any frames", "");
+    assert!(replay.status.success() && said.trim().is_empty(), "{}: {said}", replay.status);
 }

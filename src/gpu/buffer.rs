@@ -60,6 +60,10 @@ impl<T> Buffer<T> {
     }
 }
 
+/// Staging memory takes whole pages: GFXReconstruct follows the host's accesses by page and writes pages back whole,
+/// so that what the device wrote beside would be lost.
+const PAGE_BYTES: u64 = 4096;
+
 /// An untyped buffer with its memory.
 pub(super) struct RawBuffer {
     pub raw: vk::Buffer,
@@ -82,7 +86,11 @@ impl RawBuffer {
         // SAFETY: `info` is complete; the memory bound was made for this buffer.
         unsafe {
             let raw = device.raw.create_buffer(&info, None).checked("vkCreateBuffer", name)?;
-            let requirements = device.raw.get_buffer_memory_requirements(raw);
+            let mut requirements = device.raw.get_buffer_memory_requirements(raw);
+            if location != MemoryLocation::GpuOnly {
+                requirements.alignment = requirements.alignment.max(PAGE_BYTES);
+                requirements.size = requirements.size.next_multiple_of(PAGE_BYTES);
+            }
             let allocation = match device.allocate(name, requirements, location, true) {
                 Ok(allocation) => allocation,
                 Err(error) => {
