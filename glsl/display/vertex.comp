@@ -26,7 +26,7 @@ layout(set = 0, binding = 10, scalar) readonly buffer BackElements { uint back_e
 layout(set = 0, binding = 11, scalar) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer ShadowViews { ShadowView shadow_views[]; };
-layout(set = 0, binding = 14) uniform sampler2DArrayShadow shadow_maps;
+layout(set = 0, binding = 14) uniform sampler2DArray shadow_maps;
 layout(set = 0, binding = 15, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
 layout(set = 0, binding = 16) uniform sampler2D environment_map;
 layout(set = 0, binding = 17, scalar) buffer Direct { vec3 direct[]; };
@@ -47,29 +47,53 @@ layout(push_constant, scalar) uniform Params {
 
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
 
-// Share of a light's view that is free towards `point`: 3 x 3 bilinear comparisons one texel apart. The point is
-// moved off its surface by what a texel covers there, so that a surface does not shadow itself.
+vec3 shadow_ndc(ShadowView view, vec3 point)
+{
+    vec4 clip = view.clip_from_world * vec4(point, 1.0);
+    return clip.xyz / clip.w;
+}
+
+// Share of the light that reaches `point`: 3 texels a side around it, smoothed. Each texel is compared with the depth
+// of the surface's own plane there (projections keep planes plane), so no surface shadows itself, and nothing has to
+// be moved towards the light, which would leak through walls without thickness.
 float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 to_light, float distance_to_light)
 {
     ShadowLight views = shadow_lights[light];
     if (views.count == 0) return 1.0;
     uint layer = views.first + (views.count == 6 ? cube_face(-to_light) : 0u);
     ShadowView view = shadow_views[layer];
-    float texel = view.texel_extent > 0.0 ? view.texel_extent : view.texel_angle * distance_to_light;
-    // At grazing angles a texel covers much depth: more along the normal, little along the light.
-    float slope = sqrt(max(1.0 - pow(dot(surface_normal, to_light), 2.0), 0.0));
-    vec3 moved = point + surface_normal * (2.5 * texel * slope) + to_light * (1.0 * texel);
-    vec4 clip = view.clip_from_world * vec4(moved, 1.0);
-    if (clip.w <= 0.0) return 1.0;
-    vec3 at = clip.xyz / clip.w;
-    vec2 uv = at.xy * 0.5 + 0.5;
-    if (any(lessThan(uv, vec2(0.0))) || any(greaterThan(uv, vec2(1.0)))) return 1.0;
+    if ((view.clip_from_world * vec4(point, 1.0)).w <= 0.0) return 1.0;
+    vec3 at = shadow_ndc(view, point);
+    if (any(greaterThan(abs(at.xy), vec2(1.0)))) return 1.0;
 
-    vec2 step_uv = 1.0 / vec2(textureSize(shadow_maps, 0).xy);
+    // How depth changes over the plane, from two steps of a texel's width along it.
+    float texel = view.texel_extent > 0.0 ? view.texel_extent : view.texel_angle * distance_to_light;
+    mat3 basis = basis_of(surface_normal);
+    vec3 along_u = shadow_ndc(view, point + texel * basis[0]) - at;
+    vec3 along_v = shadow_ndc(view, point + texel * basis[1]) - at;
+    float det = along_u.x * along_v.y - along_u.y * along_v.x;
+    vec2 slope = det == 0.0 ? vec2(0.0)
+        : vec2(along_u.z * along_v.y - along_v.z * along_u.y, along_v.z * along_u.x - along_u.z * along_v.x) / det;
+    ivec2 size = textureSize(shadow_maps, 0).xy;
+    vec2 texel_ndc = 2.0 / vec2(size);
+    // One texel's width towards the light, in depth: the measure of what counts as nearer.
+    float step_depth = abs(shadow_ndc(view, point + texel * to_light).z - at.z);
+    slope = clamp(slope * texel_ndc, vec2(-30.0 * step_depth), vec2(30.0 * step_depth));
+
+    vec2 place = (at.xy * 0.5 + 0.5) * vec2(size) - 0.5;
+    ivec2 first = ivec2(floor(place)) - 1;
+    vec2 f = place - floor(place);
     float sum = 0.0;
-    for (int y = -1; y <= 1; ++y)
-        for (int x = -1; x <= 1; ++x)
-            sum += texture(shadow_maps, vec4(uv + vec2(x, y) * step_uv, layer, at.z));
+    for (int y = 0; y < 4; ++y) {
+        float weight_y = y == 0 ? 1.0 - f.y : y == 3 ? f.y : 1.0;
+        for (int x = 0; x < 4; ++x) {
+            float weight = weight_y * (x == 0 ? 1.0 - f.x : x == 3 ? f.x : 1.0);
+            ivec2 texel_at = clamp(first + ivec2(x, y), ivec2(0), size - 1);
+            float plane = at.z + dot(slope, vec2(first + ivec2(x, y)) - place);
+            float nearest = texelFetch(shadow_maps, ivec3(texel_at, layer), 0).x;
+            sum += plane + 0.2 * step_depth >= nearest ? weight : 0.0;
+        }
+    }
     return sum / 9.0;
 }
 

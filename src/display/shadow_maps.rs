@@ -50,7 +50,7 @@ impl ShadowMaps {
         })?;
         Ok(Self {
             depth,
-            sampler: context.sampler("shadow maps/compare", SamplerDescription::SHADOW)?,
+            sampler: context.sampler("shadow maps/texels", SamplerDescription::NEAREST_CLAMP)?,
             views: context.buffer("shadow maps/views", view_count.max(1) as usize)?,
             lights: context.buffer("shadow maps/lights", pose.lights.len().max(1))?,
             view_count,

@@ -300,8 +300,6 @@ pub struct SamplerDescription {
     pub mip_linear: bool,
     /// Levels beyond the first are read.
     pub mipmapped: bool,
-    /// A depth comparison sampler: returns the share of texels with reference >= texel (depth is reversed).
-    pub compare: bool,
 }
 
 impl SamplerDescription {
@@ -312,12 +310,9 @@ impl SamplerDescription {
         min_linear: true,
         mip_linear: false,
         mipmapped: false,
-        compare: false,
     };
     /// Nearest texel, clamped.
     pub const NEAREST_CLAMP: Self = Self { mag_linear: false, min_linear: false, ..Self::LINEAR_CLAMP };
-    /// Depth comparison with bilinear filtering.
-    pub const SHADOW: Self = Self { compare: true, ..Self::LINEAR_CLAMP };
 }
 
 pub struct Sampler {
@@ -340,9 +335,7 @@ impl Sampler {
             .address_mode_u(address(d.address[0]))
             .address_mode_v(address(d.address[1]))
             .address_mode_w(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .max_lod(if d.mipmapped { vk::LOD_CLAMP_NONE } else { 0.0 })
-            .compare_enable(d.compare)
-            .compare_op(vk::CompareOp::GREATER_OR_EQUAL);
+            .max_lod(if d.mipmapped { vk::LOD_CLAMP_NONE } else { 0.0 });
         // SAFETY: complete create info.
         let raw = unsafe { device.raw.create_sampler(&info, None) }.checked("vkCreateSampler", name)?;
         device.set_name(raw, name);

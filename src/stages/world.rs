@@ -371,6 +371,5 @@ fn sampler_description(texture: &scene::Texture) -> SamplerDescription {
         min_linear: texture.min_linear,
         mip_linear: texture.mip_linear,
         mipmapped: texture.mipmapped,
-        compare: false,
     }
 }
