@@ -55,7 +55,9 @@ vec3 shadow_ndc(ShadowView view, vec3 point)
 
 // Share of the light that reaches `point`: 3 texels a side around it, smoothed. Each texel is compared with the depth
 // of the surface's own plane there (projections keep planes plane), so no surface shadows itself, and nothing has to
-// be moved towards the light, which would leak through walls without thickness.
+// be moved towards the light, which would leak through walls without thickness. A texel where the light sees well past
+// the plane tells nothing of this surface, which ends before it: it counts as blocked where others are, or sunlight
+// outside would shine in along the edges of a room.
 float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 to_light, float distance_to_light)
 {
     ShadowLight views = shadow_lights[light];
@@ -83,7 +85,7 @@ float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 to_light, floa
     vec2 place = (at.xy * 0.5 + 0.5) * vec2(size) - 0.5;
     ivec2 first = ivec2(floor(place)) - 1;
     vec2 f = place - floor(place);
-    float sum = 0.0;
+    float free = 0.0, blocked = 0.0, beyond = 0.0;
     for (int y = 0; y < 4; ++y) {
         float weight_y = y == 0 ? 1.0 - f.y : y == 3 ? f.y : 1.0;
         for (int x = 0; x < 4; ++x) {
@@ -91,10 +93,12 @@ float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 to_light, floa
             ivec2 texel_at = clamp(first + ivec2(x, y), ivec2(0), size - 1);
             float plane = at.z + dot(slope, vec2(first + ivec2(x, y)) - place);
             float nearest = texelFetch(shadow_maps, ivec3(texel_at, layer), 0).x;
-            sum += plane + 0.2 * step_depth >= nearest ? weight : 0.0;
+            if (plane - nearest > 4.0 * step_depth) beyond += weight;
+            else if (plane + 0.01 * step_depth >= nearest) free += weight;
+            else blocked += weight;
         }
     }
-    return sum / 9.0;
+    return blocked > 0.0 ? free / (free + blocked + beyond) : 1.0;
 }
 
 void add(uint index, vec3 direct_value, vec3 indirect_value, vec3 albedo_value, vec3 normal_value, float depth_value)
