@@ -120,6 +120,9 @@ pub struct RenderArgs {
     /// Tone mapping, for .png
     #[arg(long, value_enum, default_value_t)]
     pub tonemap: Operator,
+    /// How rays are cast
+    #[arg(long, value_enum, default_value_t)]
+    pub rays: Rays,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
@@ -146,6 +149,19 @@ pub enum Display {
     /// Interpolate the solution between vertices
     #[default]
     Vertex,
+}
+
+/// Ways to cast rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rays {
+    /// The GPU's own traversal where it has one, else compute
+    #[default]
+    Auto,
+    /// Our own traversal in compute shaders
+    Compute,
+    /// The device's traversal (VK_KHR_ray_query)
+    RayQuery,
 }
 
 /// Named channels of an EXR beside RGB.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use serde_json::{Map, Value, json};
 
-use super::cli::{Channel, Display, Global, RenderArgs};
+use super::cli::{Channel, Display, Global, Rays, RenderArgs};
 use super::console::{Console, Verbosity};
 use super::interrupt::Interrupt;
 use super::output::Measured;
@@ -54,6 +54,7 @@ pub struct RenderRequest {
     /// Tessellation target; `None` leaves the scene as it is.
     pub elements: Option<u32>,
     pub tone: ToneSettings,
+    pub rays: Rays,
     pub seed: u32,
     /// Checked: [`RenderRequest::settings`] of the method's own type succeeds.
     pub assignments: Vec<Assignment>,
@@ -129,6 +130,7 @@ impl TryFrom<RenderArgs> for RenderRequest {
             },
             elements: args.elements,
             tone: ToneSettings { operator: args.tonemap, exposure: args.exposure, ..ToneSettings::default() },
+            rays: args.rays,
             seed: args.seed,
             assignments: args.set,
             channels,
@@ -164,6 +166,7 @@ impl RenderRequest {
         insert("diffuse", self.diffuse.into());
         insert("light", self.light.name().into());
         insert("elements", json!(self.elements));
+        insert("rays", serde_json::to_value(self.rays)?);
         insert("seed", self.seed.into());
         if let Some(Display::Vertex) = self.display {
             insert("display", "vertex".into());

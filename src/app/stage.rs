@@ -3,9 +3,10 @@
 use glam::{UVec2, Vec3};
 
 use super::AppError;
+use super::cli::Rays;
 use super::render::RenderRequest;
 use super::values::SceneSource;
-use crate::gpu::Context;
+use crate::gpu::{AccelerationStructure, Context};
 use crate::report::profile::SceneFacts;
 use crate::report::trace::TimeLine;
 use crate::scene::camera::View;
@@ -37,6 +38,8 @@ pub struct Stage {
     pub view: View,
     pub world: World,
     pub bvh: Bvh,
+    /// The device's own structure, where its traversal is used.
+    pub acceleration: Option<AccelerationStructure>,
 }
 
 impl Stage {
@@ -81,13 +84,17 @@ impl Stage {
             geometry.triangle_count(),
             pose.lights.len()
         );
+        let acceleration = build_acceleration(context, request.rays, &world)?;
         let environment = environment.environment;
-        Ok(Self { scene, geometry, rest_positions, environment, pose, bounds, view, world, bvh })
+        Ok(Self { scene, geometry, rest_positions, environment, pose, bounds, view, world, bvh, acceleration })
     }
 
     /// How rays are cast at the scene.
     pub fn tracer(&self) -> Tracer<'_> {
-        Tracer::Compute(&self.bvh, (&self.world).into())
+        match &self.acceleration {
+            Some(structure) => Tracer::RayQuery(structure, (&self.world).into()),
+            None => Tracer::Compute(&self.bvh, (&self.world).into()),
+        }
     }
 
     /// What was rendered, in numbers.
@@ -99,6 +106,28 @@ impl Stage {
             lights: self.pose.lights.len() as u64,
         }
     }
+}
+
+/// Builds the device's own structure if it is to be used. A software driver's traversal is far slower than ours, so it
+/// is used only when asked for by name.
+fn build_acceleration(context: &Context, rays: Rays, world: &World) -> Result<Option<AccelerationStructure>, AppError> {
+    let wanted = match rays {
+        Rays::Compute => false,
+        Rays::RayQuery => true,
+        Rays::Auto => context.features().ray_query && context.info().kind != "CPU",
+    };
+    if !wanted {
+        return Ok(None);
+    }
+    let structure = context.acceleration_structure("acceleration/scene", &world.positions, &world.triangles)?;
+    let Some(structure) = structure else {
+        let name = &context.info().name;
+        return Err(AppError::failed(format!("{name} has no ray query (VK_KHR_ray_query); use --rays compute")));
+    };
+    let mut recorder = context.recorder("acceleration build")?;
+    recorder.build_acceleration_structure(&structure, &world.positions, &world.triangles);
+    recorder.submit()?;
+    Ok(Some(structure))
 }
 
 fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
