@@ -3,12 +3,11 @@
 use crate::common::TestContext;
 use glam::Vec3;
 use linklight::methods::explicit_visibility::{ExplicitVisibility, Settings, Stage};
-use linklight::scene::builtin::{self, Source};
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
 use linklight::scene::tessellate::{Fineness, tessellate};
-use linklight::scene::{Scene, deform, load_bytes};
+use linklight::scene::{self, LoadOptions, Scene, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
@@ -26,9 +25,7 @@ pub struct Fixture {
 }
 
 pub fn builtin_scene(name: &str) -> Scene {
-    match builtin::resolve(name).unwrap() {
-        Source::File(bytes) => load_bytes(name, bytes).unwrap(),
-    }
+    scene::open(&format!("builtin:{name}"), &LoadOptions::default()).unwrap()
 }
 
 impl Fixture {

@@ -4,13 +4,12 @@ use crate::common::TestContext;
 use glam::{UVec2, Vec2, Vec3};
 use linklight::gpu::Context;
 use linklight::methods::path_tracing::{ErrorEstimate, Options, PathTracing, Settings};
-use linklight::scene::builtin::{self, Source};
 use linklight::scene::camera::{Lens, View};
 use linklight::scene::deform::world_vertices;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
-use linklight::scene::{self, Scene};
+use linklight::scene::{self, LoadOptions, Scene};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
 use linklight::stages::trace::Tracer;
@@ -22,8 +21,7 @@ pub fn options(size: u32, bounces: u32) -> Options {
 }
 
 pub fn builtin(name: &str) -> Scene {
-    let Source::File(bytes) = builtin::resolve(name).unwrap();
-    scene::load_bytes(name, bytes).unwrap()
+    scene::open(&format!("builtin:{name}"), &LoadOptions::default()).unwrap()
 }
 
 /// Everything that belongs to one scene.

@@ -9,14 +9,39 @@ use rayon::prelude::*;
 
 const NO_VERTEX: u32 = u32::MAX;
 
+/// Edge of the blocks that are looked at as a whole, in cells.
+const BLOCK: u32 = 8;
+/// By how many metres a field may change within a metre.
+const STEEPEST: f32 = 2.5;
+
 /// Meshes `field = 0` (negative inside) within the box `low..high` on cubes of edge `cell` metres. The surface must not
-/// touch the box. Normals follow the field's gradient. Memory: 8 bytes per grid point.
+/// touch the box, and the field must not be much steeper than a distance is (at most 2.5 m per metre). Normals follow the field's gradient. Memory: 8 bytes per grid point.
 pub fn isosurface(low: Vec3, high: Vec3, cell: f32, field: impl Fn(Vec3) -> f32 + Sync) -> Shape {
     let n = ((high - low) / cell).ceil().max(Vec3::ONE).as_uvec3() + UVec3::ONE;
     let position = |i: UVec3| low + i.as_vec3() * cell;
     let slice = (n.x * n.y) as usize;
     let coordinates = |i: usize| UVec3::new(i as u32 % n.x, i as u32 / n.x % n.y, (i / slice) as u32);
-    let values: Vec<f32> = (0..slice * n.z as usize).into_par_iter().map(|i| field(position(coordinates(i)))).collect();
+    // Where the field at the middle of a block is larger than it can fall within the block, the block has no surface.
+    let blocks = n.map(|count| count.div_ceil(BLOCK));
+    let block_slice = (blocks.x * blocks.y) as usize;
+    let reach = STEEPEST * cell * BLOCK as f32 * 3f32.sqrt() * 0.5;
+    let empty: Vec<Option<f32>> = (0..block_slice * blocks.z as usize)
+        .into_par_iter()
+        .map(|i| {
+            let block = UVec3::new(i as u32 % blocks.x, i as u32 / blocks.x % blocks.y, (i / block_slice) as u32);
+            let middle = low + (block.as_vec3() + 0.5) * (BLOCK as f32 * cell);
+            Some(field(middle)).filter(|value| value.abs() > reach)
+        })
+        .collect();
+    let values: Vec<f32> = (0..slice * n.z as usize)
+        .into_par_iter()
+        .map(|i| {
+            let at = coordinates(i);
+            let block = at / BLOCK;
+            let known = empty[(block.x + blocks.x * block.y) as usize + block_slice * block.z as usize];
+            known.unwrap_or_else(|| field(position(at)))
+        })
+        .collect();
     let index = |i: UVec3| (i.x + n.x * i.y) as usize + slice * i.z as usize;
 
     let gradient = |p: Vec3| {
@@ -39,7 +64,7 @@ pub fn isosurface(low: Vec3, high: Vec3, cell: f32, field: impl Fn(Vec3) -> f32 
         }
         let start = low + (cell_low.as_vec3() + sum / count as f32) * cell;
         let mut p = start;
-        for _ in 0..3 {
+        for _ in 0..2 {
             let g = gradient(p);
             p -= g * (field(p) / g.length_squared().max(0.05));
         }

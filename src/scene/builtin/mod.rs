@@ -1,6 +1,10 @@
 //! The scenes that come with the program, by name: `builtin:NAME` on the command line.
 //!
-//! Most are .glb files in `assets/`, made by `tools/make_scenes` and kept inside the binary.
+//! Most are .glb files in `assets/`, made by `tools/make_scenes` and kept inside the binary. The gallery is made when it
+//! is loaded, with as many triangles as asked: `builtin:gallery?triangles=1500000`.
+
+mod gallery;
+mod statues;
 
 use super::{LoadOptions, Scene, SceneError, load, load_bytes_with};
 use std::path::Path;
@@ -23,6 +27,8 @@ pub struct Builtin {
 pub enum Source {
     /// The bytes of a .glb file.
     File(&'static [u8]),
+    /// Made on the spot, with about so many triangles.
+    Gallery { triangles: u32 },
 }
 
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -31,6 +37,19 @@ pub enum BuiltinError {
     UnknownName { name: String },
     #[error("built-in scene '{name}' takes no parameters, but '{parameters}' was given; write builtin:{name}")]
     NoParameters { name: String, parameters: String },
+    #[error(
+        "built-in scene 'gallery' does not understand '{parameters}'; it takes triangles=N with N from {} to {}, as in \
+         builtin:gallery?triangles={}",
+        gallery::TRIANGLES.start(),
+        gallery::TRIANGLES.end(),
+        gallery::DEFAULT_TRIANGLES
+    )]
+    GalleryParameters { parameters: String },
+    #[error(
+        "built-in scene 'gallery' with {triangles} triangles needs {needed} bytes to be made, more than the {allowed} \
+         allowed; ask for fewer triangles or allow more memory"
+    )]
+    GalleryMemory { triangles: u32, needed: u64, allowed: u64 },
 }
 
 /// Why [`open`] failed.
@@ -47,13 +66,13 @@ macro_rules! file {
         Builtin {
             name: $name,
             description: $description,
-            source: Source::File(include_bytes!(concat!("../../assets/", $name, ".glb"))),
+            source: Source::File(include_bytes!(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/", $name, ".glb"))),
         }
     };
 }
 
 /// All built-in scenes, simplest first.
-pub static BUILTINS: [Builtin; 11] = [
+pub static BUILTINS: [Builtin; 12] = [
     file!("cornell-box", "the Cornell box as measured: two boxes under an area light"),
     file!("cornell-empty", "the Cornell box without its boxes"),
     file!("furnace", "closed room, albedo 0.5 and radiance 1 everywhere: after k bounces 2 - 2^-k"),
@@ -65,6 +84,11 @@ pub static BUILTINS: [Builtin; 11] = [
     file!("tea-room", "silver, copper and glazed pots on a table, arched windows, a lamp; glossy and metallic"),
     file!("church", "a basilica: arches on columns, stained glass, sun through the clerestory, candles"),
     file!("dancer", "a skinned dancer and a morphing blob on a stage, four seconds in a loop"),
+    Builtin {
+        name: "gallery",
+        description: "eight statues under a skylight; gallery?triangles=N sets their detail",
+        source: Source::Gallery { triangles: gallery::DEFAULT_TRIANGLES },
+    },
 ];
 
 /// Finds a scene by `NAME` or `NAME?PARAMETERS` (without the prefix).
@@ -75,6 +99,13 @@ pub fn resolve(name: &str) -> Result<Source, BuiltinError> {
     match builtin.source {
         Source::File(_) if !parameters.is_empty() => {
             Err(BuiltinError::NoParameters { name: stem.into(), parameters: parameters.into() })
+        }
+        Source::Gallery { .. } if !parameters.is_empty() => {
+            let asked = parameters.strip_prefix("triangles=").and_then(|n| n.parse().ok());
+            match asked.filter(|n| gallery::TRIANGLES.contains(n)) {
+                Some(triangles) => Ok(Source::Gallery { triangles }),
+                None => Err(BuiltinError::GalleryParameters { parameters: parameters.into() }),
+            }
         }
         source => Ok(source),
     }
@@ -88,6 +119,13 @@ pub fn open(scene: &str, options: &LoadOptions) -> Result<Scene, OpenError> {
     match scene.strip_prefix(PREFIX) {
         Some(name) => match resolve(name)? {
             Source::File(bytes) => Ok(load_bytes_with(scene, bytes, options)?),
+            Source::Gallery { triangles } => {
+                let (needed, allowed) = (u64::from(triangles) * gallery::BYTES_PER_TRIANGLE, options.max_memory_bytes);
+                if needed > allowed {
+                    return Err(BuiltinError::GalleryMemory { triangles, needed, allowed }.into());
+                }
+                Ok(gallery::gallery(triangles))
+            }
         },
         None => Ok(load(Path::new(scene), options)?),
     }
@@ -124,6 +162,30 @@ mod tests {
     fn an_unknown_name_lists_the_choices() {
         let message = resolve("cornel-box").unwrap_err().to_string();
         assert!(message.contains("cornel-box") && message.contains("cornell-box"), "{message}");
+    }
+
+    #[test]
+    fn the_gallery_takes_a_number_of_triangles() {
+        assert_eq!(resolve("gallery?triangles=1500000"), Ok(Source::Gallery { triangles: 1_500_000 }));
+        for bad in [
+            "triangles",
+            "triangles=",
+            "triangles=3",
+            "triangles=-1",
+            "triangles=1e6",
+            "statues=4",
+            "triangles=99999999999",
+        ] {
+            let message = resolve(&format!("gallery?{bad}")).unwrap_err().to_string();
+            assert!(message.contains(bad) && message.contains("triangles=N"), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_gallery_keeps_to_the_memory_allowed() {
+        let options = LoadOptions { max_memory_bytes: 1 << 20, ..LoadOptions::default() };
+        let message = open("builtin:gallery", &options).unwrap_err().to_string();
+        assert!(message.contains("100000 triangles") && message.contains("1048576"), "{message}");
     }
 
     #[test]
