@@ -1,60 +1,80 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/bvh.glsl"
+#include "lib/bvh_pack.glsl"
 
-// One thread per node of a level: the bounds of its children, and the cost of its subtree.
+// One thread per node of a level: its bounds, its children's bounds in its grid, and the cost of its subtree.
 // Runs over several small levels, deepest first, in one dispatch of one workgroup; over a large level in a dispatch of
 // its own.
-// reads level_first[level_count + 1], bvh_triangles (m)
-// updates bvh_nodes, subtree_costs[node_count] (m2: area-weighted visits of nodes and triangles)   shared none
+// reads level_first[level_count + 1], triangle_texels (m)
+// updates node_texels, node_bounds[node_count] (m), subtree_costs[node_count] (m2: area-weighted visits)   shared none
 layout(local_size_x = 256) in;
-layout(set = 0, binding = 0, scalar) readonly buffer LevelFirst     { uint level_first[]; };         // level_count + 1
-layout(set = 0, binding = 1, scalar) readonly buffer Triangles      { BvhTriangle bvh_triangles[]; };// triangle_count
-layout(set = 0, binding = 2, scalar) coherent buffer Nodes          { BvhNode bvh_nodes[]; };        // node_count
-layout(set = 0, binding = 3, scalar) coherent buffer SubtreeCosts   { float subtree_costs[]; };      // node_count
+layout(set = 0, binding = 0, scalar) readonly buffer LevelFirst { uint level_first[]; };      // level_count + 1
+layout(set = 0, binding = 1, scalar) readonly buffer Triangles  { uvec4 triangle_texels[]; }; // TRIANGLE_TEXELS each
+layout(set = 0, binding = 2, scalar) buffer Nodes               { uvec4 node_texels[]; };     // NODE_TEXELS each
+layout(set = 0, binding = 3, scalar) coherent buffer Bounds     { BvhBounds node_bounds[]; }; // node_count
+layout(set = 0, binding = 4, scalar) coherent buffer Costs      { float subtree_costs[]; };   // node_count
 layout(push_constant, scalar) uniform Params {
     uint deepest_level, highest_level;
 } params;
 
+BvhBounds leaf_bounds(uint first, uint count)
+{
+    vec3 low = vec3(1e30), high = vec3(-1e30);
+    for (uint slot = first; slot < first + count; ++slot) {
+        uvec4 texel0 = triangle_texels[TRIANGLE_TEXELS * slot], texel1 = triangle_texels[TRIANGLE_TEXELS * slot + 1];
+        vec3 a = uintBitsToFloat(texel0.xyz);
+        vec3 b = uintBitsToFloat(uvec3(texel0.w, texel1.xy));
+        vec3 c = uintBitsToFloat(uvec3(texel1.zw, triangle_texels[TRIANGLE_TEXELS * slot + 2].x));
+        low = min(low, min(a, min(b, c)));
+        high = max(high, max(a, max(b, c)));
+    }
+    vec3 largest = max(abs(low), abs(high));
+    float slack = BVH_SLACK * max(largest.x, max(largest.y, largest.z));
+    return BvhBounds(low - slack, high + slack);
+}
+
+// Exponent bits of the least power of two that spans `extent` in 255 cells.
+uint grid_exponent(float extent) { return clamp(floatBitsToUint(extent / 255) + 0x7fffffu >> 23, 1u, 254u); }
+
 void refit(uint node)
 {
+    uint word = node_texels[NODE_TEXELS * node].w;
+    uint first_child = node_texels[NODE_TEXELS * node + 2].z, slot = node_texels[NODE_TEXELS * node + 2].w;
+    BvhBounds children[4];
+    BvhBounds all = BvhBounds(vec3(1e30), vec3(-1e30));
     float cost = 0;
-    for (uint k = 0; k < 4; ++k) {
-        uint child = bvh_nodes[node].child[k];
-        if (child == EMPTY) continue;
-        vec3 low = vec3(1e30), high = vec3(-1e30);
+    [[unroll]] for (uint k = 0; k < 4; ++k) {
+        uint kind = child_kind(word, k);
+        if (kind == 0) continue;
         float visits = 1;
-        if ((child & LEAF) != 0) {
-            uint first = leaf_first(child), count = leaf_count(child);
-            for (uint slot = first; slot < first + count; ++slot) {
-                for (uint corner = 0; corner < 3; ++corner) {
-                    low = min(low, bvh_triangles[slot].corners[corner]);
-                    high = max(high, bvh_triangles[slot].corners[corner]);
-                }
-            }
-            vec3 largest = max(abs(low), abs(high));
-            float slack = BVH_SLACK * max(largest.x, max(largest.y, largest.z));
-            low -= slack;
-            high += slack;
-            visits = float(count);
+        if (kind == KIND_INNER) {
+            children[k] = node_bounds[first_child + k];
+            cost += subtree_costs[first_child + k];
         } else {
-            for (uint j = 0; j < 4; ++j) {
-                if (bvh_nodes[child].child[j] == EMPTY) continue;
-                low = min(low, vec3(bvh_nodes[child].min_x[j], bvh_nodes[child].min_y[j], bvh_nodes[child].min_z[j]));
-                high = max(high, vec3(bvh_nodes[child].max_x[j], bvh_nodes[child].max_y[j], bvh_nodes[child].max_z[j]));
-            }
-            cost += subtree_costs[child];
+            children[k] = leaf_bounds(slot, kind);
+            slot += kind;
+            visits = float(kind);
         }
-        bvh_nodes[node].min_x[k] = low.x;
-        bvh_nodes[node].min_y[k] = low.y;
-        bvh_nodes[node].min_z[k] = low.z;
-        bvh_nodes[node].max_x[k] = high.x;
-        bvh_nodes[node].max_y[k] = high.y;
-        bvh_nodes[node].max_z[k] = high.z;
-        vec3 size = high - low;
+        all = BvhBounds(min(all.low, children[k].low), max(all.high, children[k].high));
+        vec3 size = children[k].high - children[k].low;
         cost += visits * 2 * (size.x * size.y + size.y * size.z + size.z * size.x);
     }
+    node_bounds[node] = all;
     subtree_costs[node] = cost;
+
+    // Round the children's bounds outwards to the grid.
+    vec3 extent = max(all.high - all.low, vec3(0));
+    word = word & 0xff000000u | grid_exponent(extent.x) | grid_exponent(extent.y) << 8 | grid_exponent(extent.z) << 16;
+    vec3 cell = grid_cell(word);
+    uvec3 lows = uvec3(0), highs = uvec3(0);
+    [[unroll]] for (uint k = 0; k < 4; ++k) {
+        if (child_kind(word, k) == 0) continue;
+        lows |= uvec3(clamp(floor((children[k].low - all.low) / cell), 0, 255)) << 8 * k;
+        highs |= uvec3(clamp(ceil((children[k].high - all.low) / cell), 0, 255)) << 8 * k;
+    }
+    node_texels[NODE_TEXELS * node] = uvec4(floatBitsToUint(all.low), word);
+    node_texels[NODE_TEXELS * node + 1] = uvec4(lows.x, highs.x, lows.y, highs.y);
+    node_texels[NODE_TEXELS * node + 2].xy = uvec2(lows.z, highs.z);
 }
 
 void main()

@@ -23,6 +23,7 @@ impl<T> Buffer<T> {
             return Err(GpuError::StorageRange { name: name.to_owned(), bytes, allowed });
         }
         let mut usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
             | vk::BufferUsageFlags::INDIRECT_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;

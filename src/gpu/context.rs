@@ -1,6 +1,5 @@
 //! The front door of the GPU layer: one [`Context`] per device, from which everything is made.
 
-use super::Buffer;
 use super::device::{Device, Limits, MemoryUse, lock};
 use super::error::{Checked, GpuError};
 use super::features::OptionalFeatures;
@@ -10,6 +9,7 @@ use super::pipelines::Pipelines;
 use super::profiler::{ClockPair, PassRecord};
 use super::recorder::{CommandSlot, PASSES_PER_POOL, Recorder};
 use super::selection::{self, DeviceInfo};
+use super::{Buffer, TexelBuffer};
 use ash::vk;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -107,6 +107,11 @@ impl Context {
     /// A buffer of `len` elements with undefined content. Names are `owner/what`.
     pub fn buffer<T>(&self, name: &str, len: usize) -> Result<Buffer<T>, GpuError> {
         Buffer::new(&self.device, name, len)
+    }
+
+    /// `len` texels of four words with undefined content.
+    pub fn texel_buffer(&self, name: &str, len: usize) -> Result<TexelBuffer, GpuError> {
+        TexelBuffer::new(&self.device, name, len)
     }
 
     pub fn image(&self, description: &ImageDescription<'_>) -> Result<Image, GpuError> {

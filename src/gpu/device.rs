@@ -20,6 +20,8 @@ pub const MAX_TEXTURES: u32 = 4096;
 pub struct Limits {
     /// Largest buffer a pass can bind, bytes.
     pub storage_buffer_bytes: u64,
+    /// Longest texel buffer, texels of 16 bytes.
+    pub texel_buffer_elements: u32,
     /// Workgroups per dispatch dimension.
     pub workgroup_count: u32,
     pub image_extent: u32,
@@ -68,6 +70,7 @@ pub struct MemoryUse {
 /// Objects waiting for the device to be done with them.
 pub(super) enum Grave {
     Buffer(vk::Buffer, Allocation),
+    BufferView(vk::BufferView),
     Image(vk::Image, Vec<vk::ImageView>, Allocation),
     Sampler(vk::Sampler),
     Pipelines(Vec<vk::Pipeline>),
@@ -135,6 +138,7 @@ impl Device {
             let l = instance.raw.get_physical_device_properties(physical).limits;
             let limits = Limits {
                 storage_buffer_bytes: u64::from(l.max_storage_buffer_range),
+                texel_buffer_elements: l.max_texel_buffer_elements,
                 workgroup_count: l.max_compute_work_group_count[0].min(l.max_compute_work_group_count[1]),
                 image_extent: l
                     .max_image_dimension2_d
@@ -338,6 +342,10 @@ impl Device {
                 Grave::Buffer(buffer, allocation) => {
                     self.raw.destroy_buffer(buffer, None);
                     Some(allocation)
+                }
+                Grave::BufferView(view) => {
+                    self.raw.destroy_buffer_view(view, None);
+                    None
                 }
                 Grave::Image(image, views, allocation) => {
                     views.into_iter().for_each(|view| self.raw.destroy_image_view(view, None));

@@ -27,6 +27,7 @@ mod reload;
 mod selection;
 pub mod shader_compiler;
 mod submission;
+mod texel_buffer;
 mod transfer;
 
 /// Passes and buffer structs made from the shaders by the build script.
@@ -51,3 +52,4 @@ pub use profiler::{ClockPair, Cost, PassRecord};
 pub use recorder::{Load, Recorder, Target, Threads};
 pub use reload::{Reload, ShaderWatcher, reload};
 pub use selection::{DeviceInfo, choose_device, list_devices};
+pub use texel_buffer::TexelBuffer;

@@ -1,7 +1,7 @@
 //! A pass: the static description of a program (made from its shader at build time) and one use of it with its
 //! buffers, parameters and constants.
 
-use super::{AccelerationStructure, Buffer, Image, Sampler, TextureTable};
+use super::{AccelerationStructure, Buffer, Image, Sampler, TexelBuffer, TextureTable};
 use ash::vk;
 
 /// One program: a compute shader, or a vertex and a fragment shader. Written by the build script.
@@ -50,6 +50,7 @@ pub struct BindingInfo {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResourceKind {
     Buffer,
+    TexelBuffer,
     SampledImage,
     StorageImage,
     AccelerationStructure,
@@ -96,6 +97,7 @@ pub(super) struct Resource {
 
 pub(super) enum Handle {
     Buffer(vk::DescriptorBufferInfo),
+    TexelBuffer([vk::BufferView; 1]),
     Image(vk::DescriptorImageInfo),
     AccelerationStructure(vk::AccelerationStructureKHR),
 }
@@ -104,6 +106,11 @@ impl<'b> Bindings<'b> {
     pub fn buffer<T>(&mut self, buffer: &'b Buffer<T>) {
         let info = vk::DescriptorBufferInfo::default().buffer(buffer.raw()).offset(0).range(vk::WHOLE_SIZE);
         self.resources.push(Resource { id: buffer.id(), bytes: buffer.size_bytes(), handle: Handle::Buffer(info) });
+    }
+
+    pub fn texel_buffer(&mut self, texels: &'b TexelBuffer) {
+        let handle = Handle::TexelBuffer([texels.view()]);
+        self.resources.push(Resource { id: texels.buffer().id(), bytes: texels.size_bytes(), handle });
     }
 
     pub fn sampled(&mut self, sampled: Sampled<'b>) {

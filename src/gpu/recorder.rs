@@ -481,6 +481,7 @@ unsafe fn push_descriptors(
             vk::WriteDescriptorSet::default().dst_binding(info.binding).descriptor_type(descriptor_type(info.kind));
         writes.push(match &resource.handle {
             Handle::Buffer(buffer) => write.buffer_info(std::slice::from_ref(buffer)),
+            Handle::TexelBuffer(view) => write.texel_buffer_view(view),
             Handle::Image(image) => write.image_info(std::slice::from_ref(image)),
             Handle::AccelerationStructure(_) => {
                 let mut write = write.push_next(structure);

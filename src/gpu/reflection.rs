@@ -31,6 +31,8 @@ pub struct Binding {
 pub enum BindingKind {
     /// A storage buffer: an array of this element type (or one value of it).
     Buffer(Layout),
+    /// `usamplerBuffer`: texels of four words.
+    TexelBuffer,
     /// `sampler2D`, `samplerCubeArrayShadow` ...: one image with its sampler.
     SampledImage,
     /// The unbounded `sampler2D textures[]` of the scene.
@@ -140,6 +142,7 @@ fn binding(
         }
         DescriptorType::CombinedImageSampler() if count == 1 => ((true, false), BindingKind::SampledImage, None),
         DescriptorType::CombinedImageSampler() => ((true, false), BindingKind::TextureTable, None),
+        DescriptorType::UniformTexelBuffer() => ((true, false), BindingKind::TexelBuffer, None),
         DescriptorType::StorageImage(a) => (access(a), BindingKind::StorageImage, None),
         DescriptorType::AccelStruct() => ((true, false), BindingKind::AccelerationStructure, None),
         other => return Err(format!("binding {set}.{binding}: {other:?} is not used in this project")),

@@ -155,6 +155,7 @@ fn pass_text(name: &str, pass: &PassShaders, types: &mut BTreeMap<String, Struct
                 collect_types(layout, types)?;
                 (format!("&'a crate::gpu::Buffer<{}>", rust_type(layout)), "buffer", "Buffer")
             }
+            BindingKind::TexelBuffer => ("&'a crate::gpu::TexelBuffer".into(), "texel_buffer", "TexelBuffer"),
             BindingKind::SampledImage => ("crate::gpu::Sampled<'a>".into(), "sampled", "SampledImage"),
             BindingKind::TextureTable => {
                 if binding.set != 1 {
