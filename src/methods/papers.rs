@@ -198,6 +198,14 @@ pub const PAPERS: &[Paper] = &[
         venue: "Journal of Computer Graphics Techniques 2(1)",
         doi: None,
     },
+    Paper {
+        key: "Ylitie2017",
+        title: "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs",
+        authors: "Henri Ylitie, Tero Karras, Samuli Laine",
+        year: 2017,
+        venue: "High-Performance Graphics",
+        doi: Some("10.1145/3105762.3105773"),
+    },
 ];
 
 #[cfg(test)]

@@ -4,60 +4,77 @@ use crate::common::{Random, TestContext};
 use crate::meshes::{Mesh, cube, point, ray, soup, sphere};
 use crate::trace::cast;
 use glam::Vec3;
-use linklight::gpu::shaders::types::BvhNode;
-use linklight::stages::bvh::topology::{EMPTY, LEAF, STACK, Topology};
-use linklight::stages::bvh::{Bvh, BvhError};
+use linklight::stages::bvh::topology::{KIND_INNER, LEAF_TRIANGLES, MAX_LEVELS, Topology};
+use linklight::stages::bvh::{Bvh, BvhError, NODE_TEXELS, TRIANGLE_TEXELS};
 use linklight::stages::trace::NO_HIT;
 
 #[derive(Debug, Default, PartialEq)]
 struct Statistics {
     nodes: usize,
     leaves: usize,
-    depth: u32,
-    largest_leaf: usize,
+    levels: usize,
 }
 
-fn bounds(node: &BvhNode, k: usize) -> (Vec3, Vec3) {
-    (Vec3::new(node.min_x[k], node.min_y[k], node.min_z[k]), Vec3::new(node.max_x[k], node.max_y[k], node.max_z[k]))
+/// A node as glsl/lib/bvh_pack.glsl lays it out: bounds, kind, and first node or slot of each child.
+fn children(node: &[[u32; 4]]) -> Vec<((Vec3, Vec3), u32, usize)> {
+    let origin = Vec3::from([0, 1, 2].map(|axis| f32::from_bits(node[0][axis])));
+    let cell = Vec3::from([0, 1, 2].map(|axis| f32::from_bits((node[0][3] >> (8 * axis) & 0xff) << 23)));
+    let (mut child, mut slot) = (node[2][2] as usize, node[2][3] as usize);
+    let corner =
+        |words: [u32; 3], k: usize| origin + cell * Vec3::from(words.map(|word| (word >> (8 * k) & 0xff) as f32));
+    (0..4)
+        .map(|k| {
+            let low = corner([node[1][0], node[1][2], node[2][0]], k);
+            let high = corner([node[1][1], node[1][3], node[2][1]], k);
+            let kind = node[0][3] >> (24 + 2 * k) & 3;
+            let place = if kind == KIND_INNER { &mut child } else { &mut slot };
+            let first = *place;
+            *place += if kind == KIND_INNER { 1 } else { kind as usize };
+            ((low, high), kind, first)
+        })
+        .filter(|(_, kind, _)| *kind != 0)
+        .collect()
+}
+
+fn is_inside(point: Vec3, (low, high): (Vec3, Vec3)) -> bool {
+    low.cmple(point).all() && high.cmpge(point).all()
 }
 
 /// Walks the tree from the root; every invariant fails with the values it saw.
 fn validate(context: &TestContext, bvh: &Bvh, mesh: &Mesh) -> Statistics {
-    let nodes = context.download(bvh.nodes()).unwrap();
-    let slots = context.download(bvh.triangles()).unwrap();
+    let nodes = context.download(bvh.nodes().buffer()).unwrap();
+    let texels = context.download(bvh.triangles().buffer()).unwrap();
     let mut statistics = Statistics::default();
     let mut seen = vec![0; mesh.triangles.len()];
-    let everywhere = (Vec3::NEG_INFINITY, Vec3::INFINITY);
-    let mut stack = vec![(0usize, everywhere, 1)];
-    while let Some((index, (low, high), depth)) = stack.pop() {
+    // A node with the bounds that all of its ancestors have for it.
+    let mut stack = vec![(0usize, Vec::new())];
+    while let Some((index, around)) = stack.pop() {
         statistics.nodes += 1;
-        statistics.depth = statistics.depth.max(depth);
-        let node = &nodes[index];
-        for k in (0..4).filter(|&k| node.child[k] != EMPTY) {
-            let (child_low, child_high) = bounds(node, k);
-            assert!(low.cmple(child_low).all() && high.cmpge(child_high).all(), "child {k} of {index} sticks out");
-            let child = node.child[k];
-            if child & LEAF == 0 {
-                assert!(child as usize > index, "node {index} has child {child}");
-                stack.push((child as usize, (child_low, child_high), depth + 1));
+        statistics.levels = statistics.levels.max(around.len() + 1);
+        for (bounds, kind, first) in children(&nodes[NODE_TEXELS * index..][..NODE_TEXELS]) {
+            let around: Vec<_> = around.iter().copied().chain([bounds]).collect();
+            if kind == KIND_INNER {
+                assert!(first > index, "node {index} has child {first}");
+                stack.push((first, around));
                 continue;
             }
             statistics.leaves += 1;
-            let (first, count) = ((child & 0xff_ffff) as usize, ((child >> 24 & 0x7f) + 1) as usize);
-            statistics.largest_leaf = statistics.largest_leaf.max(count);
-            for slot in &slots[first..first + count] {
-                seen[slot.triangle as usize] += 1;
-                let corners = mesh.triangles[slot.triangle as usize].map(|v| mesh.positions[v as usize]);
-                assert_eq!(slot.corners, corners, "triangle {}", slot.triangle);
+            for texels in texels[TRIANGLE_TEXELS * first..].chunks(TRIANGLE_TEXELS).take(kind as usize) {
+                let words = texels.as_flattened();
+                let triangle = words[9] as usize;
+                seen[triangle] += 1;
+                let corners = mesh.triangles[triangle].map(|v| mesh.positions[v as usize]);
+                let stored = [0, 3, 6].map(|k| Vec3::from([k, k + 1, k + 2].map(|word| f32::from_bits(words[word]))));
+                assert_eq!(stored, corners, "triangle {triangle}");
                 for corner in corners {
-                    let inside = child_low.cmple(corner).all() && child_high.cmpge(corner).all();
-                    assert!(inside, "{corner} of {} outside {child_low} .. {child_high}", slot.triangle);
+                    let outside = around.iter().find(|bounds| !is_inside(corner, **bounds));
+                    assert!(outside.is_none(), "{corner} of {triangle} outside {outside:?}");
                 }
             }
         }
     }
     assert!(seen.iter().all(|&count| count == 1), "each triangle lies in one leaf, found {seen:?}");
-    assert_eq!(statistics.nodes, nodes.len(), "nodes that no parent has");
+    assert_eq!(statistics.nodes * NODE_TEXELS, nodes.len(), "nodes that no parent has");
     statistics
 }
 
@@ -69,7 +86,7 @@ fn trees_of_awkward_sizes_are_valid() {
         let mesh = soup(count, 0.1, &mut random);
         let bvh = Bvh::build(&context, &mesh.positions, &mesh.triangles).unwrap();
         let statistics = validate(&context, &bvh, &mesh);
-        assert!(statistics.leaves <= count && statistics.leaves * 4 >= count, "{statistics:?} of {count}");
+        assert!(statistics.leaves <= count && statistics.leaves * LEAF_TRIANGLES >= count, "{statistics:?} of {count}");
         assert!(bvh.sah_cost(&context).unwrap() >= 1.0);
         assert!(!bvh.needs_rebuild(&context, 1.01).unwrap());
     }
@@ -82,14 +99,15 @@ fn the_validator_can_fail() {
     let mut mesh = sphere(8, 8);
     let bvh = Bvh::build(&context, &mesh.positions, &mesh.triangles).unwrap();
     mesh.positions[3] *= 1.5;
-    let positions = context.upload("test/positions", &mesh.positions).unwrap();
     // Only the triangles move: bounds are left behind.
-    let mut slots = context.download(bvh.triangles()).unwrap();
-    for slot in &mut slots {
-        slot.corners = mesh.triangles[slot.triangle as usize].map(|v| mesh.positions[v as usize]);
+    let mut texels = context.download(bvh.triangles().buffer()).unwrap();
+    for words in texels.chunks_mut(TRIANGLE_TEXELS).map(<[[u32; 4]]>::as_flattened_mut) {
+        let corners = mesh.triangles[words[9] as usize].map(|v| mesh.positions[v as usize].to_array());
+        for (word, coordinate) in words.iter_mut().zip(corners.as_flattened()) {
+            *word = coordinate.to_bits();
+        }
     }
-    context.write(bvh.triangles(), &slots).unwrap();
-    drop(positions);
+    context.write(bvh.triangles().buffer(), &texels).unwrap();
     validate(&context, &bvh, &mesh);
 }
 
@@ -109,7 +127,7 @@ fn refit_follows_the_vertices_and_rebuild_restores_quality() {
         buffer
     };
     // There and back again gives the bounds of the build.
-    let fresh = context.download(bvh.nodes()).unwrap();
+    let fresh = context.download(bvh.nodes().buffer()).unwrap();
     let moved = Mesh {
         positions: mesh.positions.iter().map(|p| *p + 0.3 * Vec3::new(p.y * p.y, p.z, p.x)).collect(),
         triangles: mesh.triangles.clone(),
@@ -117,7 +135,7 @@ fn refit_follows_the_vertices_and_rebuild_restores_quality() {
     refit(&bvh, &moved.positions);
     validate(&context, &bvh, &moved);
     refit(&bvh, &mesh.positions);
-    assert!(context.download(bvh.nodes()).unwrap() == fresh, "refit to the built positions changes the tree");
+    assert!(context.download(bvh.nodes().buffer()).unwrap() == fresh, "refit to the built positions changes the tree");
 
     // Strewing the triangles anew ruins the tree; a rebuild mends it.
     let strewn: Vec<Vec3> = mesh
@@ -190,7 +208,7 @@ fn degenerate_and_coincident_triangles_are_harmless() {
 }
 
 #[test]
-fn the_stack_always_suffices() {
+fn trees_are_never_deeper_than_the_stack() {
     // Each triangle is twice as large and as far as the last: trees of such scenes are as deep as they get.
     for (count, growth) in [(60u32, 2.0f32), (4000, 1.01), (2000, 0.98)] {
         let mut positions = Vec::new();
@@ -201,6 +219,6 @@ fn the_stack_always_suffices() {
         }
         let triangles: Vec<_> = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         let topology = Topology::build(&positions, &triangles);
-        assert!(topology.stack_need() <= STACK, "{} entries", topology.stack_need());
+        assert!(topology.level_count() <= MAX_LEVELS, "{} levels", topology.level_count());
     }
 }

@@ -1,19 +1,19 @@
 //! The bounding volume hierarchy over world-space triangles: built on the CPU, refitted and traversed on the GPU.
 //!
-//! Four children a node, the bounds of siblings side by side, levels stored one after the other from the root. Binary
-//! trees come from obvhs and are widened here ([`topology`]); bounds are always made by the same GPU passes, at build
-//! and after deformation, so that both agree bit by bit. Casting rays is the stage [`super::trace`].
+//! Four children a node, their bounds in eight bits, levels stored one after the other from the root. Binary trees come
+//! from obvhs and are widened here ([`topology`]); bounds are always made by the same GPU passes, at build and after
+//! deformation, so that both agree bit by bit. Casting rays is the stage [`super::trace`].
 //!
 //! What it does not do: no instancing (each instance has its own triangles), no building on the GPU.
 
 pub mod topology;
 
 use crate::gpu::shaders::bvh::{RefitNodes, RefitNodesParams, RefitTriangles, RefitTrianglesParams};
-use crate::gpu::shaders::types::{BvhNode, BvhTriangle};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
-use glam::{UVec3, Vec3};
+use crate::gpu::shaders::types::{BvhBounds, BvhSlot};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
+use glam::Vec3;
 use rayon::prelude::*;
-use topology::Topology;
+use topology::{Node, Topology};
 
 /// Largest absolute coordinate, metres: products of four of them stay finite.
 pub const COORDINATE_LIMIT: f32 = 1e9;
@@ -43,16 +43,22 @@ pub enum BvhError {
     Gpu(#[from] GpuError),
 }
 
+/// Texels of a node and of a triangle; the layout is that of glsl/lib/bvh_pack.glsl.
+pub const NODE_TEXELS: usize = 3;
+pub const TRIANGLE_TEXELS: usize = 3;
+
 /// The hierarchy on the device.
 pub struct Bvh {
     /// node_count, the root first; never empty.
-    nodes: Buffer<BvhNode>,
+    nodes: TexelBuffer,
+    /// triangle_count (at least one is allocated), in leaf order.
+    triangles: TexelBuffer,
     /// triangle_count, in leaf order.
-    triangles: Buffer<BvhTriangle>,
-    /// Vertex indices of `triangles`.
-    slot_vertices: Buffer<UVec3>,
+    slots: Buffer<BvhSlot>,
     level_first: Buffer<u32>,
-    /// m2.
+    /// node_count, metres.
+    node_bounds: Buffer<BvhBounds>,
+    /// node_count, m2.
     subtree_costs: Buffer<f32>,
     levels: Vec<u32>,
     vertex_count: usize,
@@ -64,28 +70,29 @@ impl Bvh {
     pub fn build(context: &Context, positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<Self, BvhError> {
         check(positions, triangles)?;
         let topology = Topology::build(positions, triangles);
-        let corner = |index: u32| positions[index as usize];
-        let slots: Vec<BvhTriangle> = topology
-            .slots
-            .par_iter()
-            .map(|&triangle| BvhTriangle { corners: triangles[triangle as usize].map(corner), triangle })
-            .collect();
-        let slot_vertices: Vec<UVec3> =
-            topology.slots.par_iter().map(|&triangle| UVec3::from(triangles[triangle as usize])).collect();
-        let nodes: Vec<BvhNode> =
-            topology.children.par_iter().map(|&child| BvhNode { child, ..bytemuck::Zeroable::zeroed() }).collect();
+        let slot = |&triangle: &u32| BvhSlot { vertices: triangles[triangle as usize].into(), triangle };
+        let slots: Vec<BvhSlot> = topology.slots.par_iter().map(slot).collect();
+        // What stays when bounds move: kinds and places of the children.
+        let texels = |node: &Node| {
+            let kinds = node.kinds.iter().rev().fold(0, |word, kind| word << 2 | kind);
+            [[0, 0, 0, kinds << 24], [0; 4], [0, 0, node.first_child, node.first_slot]]
+        };
+        let nodes: Vec<[[u32; 4]; NODE_TEXELS]> = topology.nodes.par_iter().map(texels).collect();
         let mut bvh = Self {
-            nodes: context.upload("bvh/nodes", &nodes)?,
-            triangles: context.upload("bvh/triangles", &slots)?,
-            slot_vertices: context.upload("bvh/slot vertices", &slot_vertices)?,
+            nodes: context.texel_buffer("bvh/nodes", NODE_TEXELS * nodes.len())?,
+            triangles: context.texel_buffer("bvh/triangles", TRIANGLE_TEXELS * slots.len().max(1))?,
+            slots: context.upload("bvh/slots", &slots)?,
             level_first: context.upload("bvh/level first", &topology.level_first)?,
+            node_bounds: context.buffer("bvh/node bounds", nodes.len())?,
             subtree_costs: context.buffer("bvh/subtree costs", nodes.len())?,
             levels: topology.level_first,
             vertex_count: positions.len(),
             built_cost: 0.0,
         };
+        context.write(bvh.nodes.buffer(), nodes.as_flattened())?;
+        let positions = context.upload("bvh/positions", positions)?;
         let mut recorder = context.recorder("bvh build")?;
-        bvh.refit_nodes(&mut recorder);
+        bvh.refit(&mut recorder, &positions)?;
         recorder.submit()?;
         bvh.built_cost = bvh.sah_cost(context)?;
         Ok(bvh)
@@ -97,12 +104,12 @@ impl Bvh {
             return Err(BvhError::VertexCount { expected: self.vertex_count, actual: positions.len() });
         }
         recorder.scope("refit", |recorder| {
-            let triangle_count = self.triangles.len() as u32;
+            let triangle_count = self.slots.len() as u32;
             recorder.dispatch(
                 &RefitTriangles {
-                    slot_vertices: &self.slot_vertices,
+                    bvh_slots: &self.slots,
                     positions,
-                    bvh_triangles: &self.triangles,
+                    triangle_texels: self.triangles.buffer(),
                     params: RefitTrianglesParams { triangle_count },
                 },
                 triangle_count,
@@ -125,8 +132,9 @@ impl Bvh {
             recorder.dispatch(
                 &RefitNodes {
                     level_first: &self.level_first,
-                    bvh_triangles: &self.triangles,
-                    bvh_nodes: &self.nodes,
+                    triangle_texels: self.triangles.buffer(),
+                    node_texels: self.nodes.buffer(),
+                    node_bounds: &self.node_bounds,
                     subtree_costs: &self.subtree_costs,
                     params: RefitNodesParams { deepest_level: deepest as u32, highest_level: highest as u32 },
                 },
@@ -142,7 +150,7 @@ impl Bvh {
     /// [Goldsmith1987]: crate::methods::PAPERS
     pub fn sah_cost(&self, context: &Context) -> Result<f32, BvhError> {
         let cost = context.download_range(&self.subtree_costs, 0..1)?;
-        let root = context.download_range(&self.nodes, 0..1)?;
+        let root = context.download_range(&self.node_bounds, 0..1)?;
         let area = root.first().map_or(0.0, surface_area);
         Ok(1.0 + if area > 0.0 { cost.first().copied().unwrap_or(0.0) / area } else { 0.0 })
     }
@@ -156,29 +164,29 @@ impl Bvh {
     /// Builds anew over the present positions and takes the place of the old tree.
     pub fn rebuild(&mut self, context: &Context, positions: &Buffer<Vec3>) -> Result<(), BvhError> {
         let positions = context.download(positions)?;
-        let mut triangles = vec![[0; 3]; self.triangles.len()];
-        let slots = context.download(&self.triangles)?;
-        for (slot, vertices) in slots.iter().zip(context.download(&self.slot_vertices)?) {
-            triangles[slot.triangle as usize] = vertices.to_array();
+        let mut triangles = vec![[0; 3]; self.slots.len()];
+        for slot in context.download(&self.slots)? {
+            triangles[slot.triangle as usize] = slot.vertices.to_array();
         }
         *self = Self::build(context, &positions, &triangles)?;
         Ok(())
     }
 
-    pub fn nodes(&self) -> &Buffer<BvhNode> {
+    pub fn nodes(&self) -> &TexelBuffer {
         &self.nodes
     }
 
     /// Triangles in leaf order.
-    pub fn triangles(&self) -> &Buffer<BvhTriangle> {
+    pub fn triangles(&self) -> &TexelBuffer {
         &self.triangles
     }
 
     pub fn size_bytes(&self) -> u64 {
         self.nodes.size_bytes()
             + self.triangles.size_bytes()
-            + self.slot_vertices.size_bytes()
+            + self.slots.size_bytes()
             + self.level_first.size_bytes()
+            + self.node_bounds.size_bytes()
             + self.subtree_costs.size_bytes()
     }
 }
@@ -199,13 +207,8 @@ fn check(positions: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), BvhError> {
     Ok(())
 }
 
-/// Of the union of the children's bounds, m2.
-fn surface_area(node: &BvhNode) -> f32 {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for k in (0..4).filter(|&k| node.child[k] != topology::EMPTY) {
-        low = low.min(Vec3::new(node.min_x[k], node.min_y[k], node.min_z[k]));
-        high = high.max(Vec3::new(node.max_x[k], node.max_y[k], node.max_z[k]));
-    }
-    let size = (high - low).max(Vec3::ZERO);
+/// m2; zero for nothing.
+fn surface_area(bounds: &BvhBounds) -> f32 {
+    let size = (bounds.high - bounds.low).max(Vec3::ZERO);
     2.0 * (size.x * size.y + size.y * size.z + size.z * size.x)
 }
