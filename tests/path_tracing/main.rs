@@ -1,6 +1,7 @@
 //! The reference against closed forms, against itself, and against pictures made by another program.
 
 mod brdf;
+mod camera;
 #[path = "../common/mod.rs"]
 mod common;
 mod consistency;

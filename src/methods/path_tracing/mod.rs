@@ -150,6 +150,12 @@ impl PathTracing {
         self.sample_count
     }
 
+    /// How many samples of every pixel are followed together: fewer at a time leave the device idle.
+    pub fn samples_at_once(&self) -> u32 {
+        let pixels = (self.options.width * self.options.height).max(1);
+        (self.paths.count() / pixels).max(1)
+    }
+
     /// Adds `samples` samples to every pixel.
     pub fn sample(
         &mut self,
