@@ -83,15 +83,16 @@ impl Method {
         match self {
             Self::PathTracing(method) => {
                 method.prepare(context, world)?;
-                // Each submission is one sample of every pixel, so that the user can interrupt between them.
-                for _ in 0..request.spp {
+                // Each submission is one batch of samples, so that the user can interrupt between them.
+                while method.sample_count() < request.spp {
                     interrupt.check()?;
+                    let samples = method.samples_at_once().min(request.spp - method.sample_count());
                     let mut recorder = context.recorder("frame")?;
                     recorder.scope("path-tracing", |recorder| {
-                        method.sample(recorder, world, &stage.tracer(), view, 1);
+                        method.sample(recorder, world, &stage.tracer(), view, samples);
                     });
                     recorder.submit()?;
-                    progress.advance(1);
+                    progress.advance(u64::from(samples));
                 }
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("path-tracing", |recorder| method.resolve(recorder, film));
