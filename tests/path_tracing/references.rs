@@ -78,7 +78,7 @@ fn cornell_box_all_bounces() {
 
 #[test]
 fn hotel_room_all_bounces() {
-    agrees("scenes/hotel_room.glb", "hotel_room.exr", 12, 16);
+    agrees("scenes/hotel_room.glb", "hotel_room.exr", 24, 16);
 }
 
 #[test]
