@@ -85,11 +85,11 @@ const uint BVH_LEVELS = 48;
 // The closest hit, or any hit where `any` is true (a constant at each call).
 //
 // Each turn takes one node and one triangle, from two queues, so that threads in lockstep have both to do most of the
-// time; in turns of a node or a leaf they mostly wait for each other. Millions of closest hits per CPU-second on
-// lavapipe 25 with 64k and 1M triangles, as multiples of obvhs's CWBVH traversal on the CPU (2026-11, benches/trace
-// scene): 1.92 and 1.95. Of the same in one run: nodes and triangles in storage buffers of 64-bit words 1.08 (a load
-// there is a test and a branch per thread, a texel fetch is not); node or leaf by turns 0.92 (and 0.75 in storage
-// buffers); bounds in f32 and storage buffers 0.5, two or eight children less; new rays for idle threads 1.88.
+// time; in turns of a node or a leaf they mostly wait for each other. Closest hits per CPU-second on lavapipe 25 as
+// multiples of obvhs's CWBVH traversal on the CPU, scene of benches/trace with 64k triangles (2026-11): 1.9, and 1.95
+// with 1M. Of the trials, with 64k: tables in storage buffers of 64-bit words 1.1 (a load there is a test and a branch
+// per thread, a texel fetch is not); a node or a leaf by turns 0.75 in such buffers; bounds in f32 0.35 to 0.45, eight
+// children less; leaves of one triangle 1.7; new rays for threads that are done, every 8 to 24 turns, 1.85.
 Hit traverse(Ray ray, bool any)
 {
     Hit hit = Hit(ray.t_max, NO_HIT, vec2(0));
