@@ -14,12 +14,14 @@ use clap::Parser;
 use linklight::scene::builtin::BUILTINS;
 
 use page::{Page, SceneRow};
-use runs::{Linklight, Quality};
+use runs::{Linklight, Quality, Subject};
 
 /// Scenes that exist to be computed by hand: little to look at, left out unless asked for.
-const ANALYTIC: [&str; 3] = ["furnace", "parallel-plates", "perpendicular-plates"];
+const ANALYTIC: [&str; 5] = ["cornell-empty", "furnace", "parallel-plates", "perpendicular-plates", "two-rooms"];
+/// Scenes that are shown with less detail than they have by default, and how.
+const LIGHTER: [(&str, &str); 1] = [("gallery", "gallery?triangles=16000")];
 /// What `--quick` shows.
-const QUICK: [&str; 2] = ["cornell-box", "maze"];
+const QUICK: [&str; 2] = ["cornell-box", "office"];
 /// The method that the others are held to.
 const REFERENCE: &str = "path-tracing";
 
@@ -37,7 +39,7 @@ struct Options {
     #[arg(long, value_name = "KEY")]
     method: Vec<String>,
     /// Width and height of the pictures in pixels
-    #[arg(long, value_name = "WxH", default_value = "320x240")]
+    #[arg(long, value_name = "WxH", default_value = "256x192")]
     size: String,
     /// Samples per pixel of the reference
     #[arg(long, value_name = "N", default_value_t = 64)]
@@ -75,7 +77,7 @@ impl Options {
     fn quality(&self) -> Quality {
         let part = if self.quick { 4 } else { 1 };
         Quality {
-            size: if self.quick { "160x120" } else { self.size.as_str() }.to_owned(),
+            size: if self.quick { "128x96" } else { self.size.as_str() }.to_owned(),
             spp: self.spp / part,
             elements: self.elements / part,
             bounces: self.bounces,
@@ -118,10 +120,12 @@ fn run(options: &Options) -> Result<usize, String> {
     let path = options.output.join("index.html");
     for name in options.scenes() {
         let description = BUILTINS.iter().find(|scene| scene.name == name).map_or("", |scene| scene.description);
-        let mut row = SceneRow::new(name, description, linklight.reference(name, REFERENCE));
+        let source = LIGHTER.iter().find(|(scene, _)| *scene == name).map_or(name, |(_, source)| source);
+        let subject = Subject { name, source };
+        let mut row = SceneRow::new(name, description, linklight.reference(subject, REFERENCE));
         report(name, REFERENCE, &row.reference.as_ref().map(|run| run.seconds));
         for method in &methods {
-            let compared = linklight.compared(name, &method.key, row.reference.as_ref().ok());
+            let compared = linklight.compared(subject, &method.key, row.reference.as_ref().ok());
             report(name, &method.key, &compared.as_ref().map(|compared| compared.run.seconds));
             row.methods.push((method.key.clone(), compared));
         }

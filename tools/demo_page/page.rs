@@ -72,7 +72,8 @@ impl Page {
             let text = format!("{}, {}, Vulkan {}", device.name, device.driver, device.api);
             let _ = writeln!(html, "<p class=\"quiet\">{}</p>", escaped(&text));
         }
-        html += "<div class=\"scroll\"><table>\n<thead><tr><th>method</th><th>what carries the light</th>";
+        html +=
+            "<div class=\"scroll\"><table class=\"words\">\n<thead><tr><th>method</th><th>what carries the light</th>";
         html += "<th>source</th></tr></thead>\n<tbody>\n";
         for Method { key, summary, source, doi } in &self.methods {
             let source = match doi {
@@ -146,7 +147,7 @@ fn scene(row: &SceneRow) -> String {
             Err(reason) => html += &failure(key, reason),
         }
     }
-    html += "</div>\n<details><summary>Passes and memory</summary>\n";
+    html += "</div>\n<details><summary>Passes that take longest</summary>\n";
     for (key, run) in row.runs() {
         html += &passes(key, run);
     }

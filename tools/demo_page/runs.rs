@@ -11,6 +11,14 @@ use linklight::report::profile::Profile;
 use linklight::report::tonemap::{ToneMap, ToneSettings};
 use serde_json::Value;
 
+/// A scene of the page.
+#[derive(Debug, Clone, Copy)]
+pub struct Subject {
+    pub name: &'static str,
+    /// What stands after `builtin:`: the name, or the name with parameters.
+    pub source: &'static str,
+}
+
 /// What all pictures of a page share.
 #[derive(Debug, Clone)]
 pub struct Quality {
@@ -101,12 +109,12 @@ impl<'a> Linklight<'a> {
     }
 
     /// The picture that the others are held to.
-    pub fn reference(&self, scene: &str, method: &str) -> Result<Run, String> {
+    pub fn reference(&self, scene: Subject, method: &str) -> Result<Run, String> {
         self.render(scene, method, &["--spp", &self.quality.spp.to_string()], None)
     }
 
     /// A method's picture, under the tone curve of the reference.
-    pub fn compared(&self, scene: &str, method: &str, reference: Option<&Run>) -> Result<Compared, String> {
+    pub fn compared(&self, scene: Subject, method: &str, reference: Option<&Run>) -> Result<Compared, String> {
         let run = self.render(
             scene,
             method,
@@ -117,11 +125,11 @@ impl<'a> Linklight<'a> {
         Ok(Compared { run, difference })
     }
 
-    fn render(&self, scene: &str, method: &str, extra: &[&str], tone: Option<ToneMap>) -> Result<Run, String> {
-        let stem = format!("{scene}.{method}");
+    fn render(&self, scene: Subject, method: &str, extra: &[&str], tone: Option<ToneMap>) -> Result<Run, String> {
+        let stem = format!("{}.{method}", scene.name);
         let [radiance, picture, profile] = ["exr", "png", "profile.json"].map(|kind| format!("{stem}.{kind}"));
         let start = Instant::now();
-        let source = format!("builtin:{scene}");
+        let source = format!("builtin:{}", scene.source);
         let bounces = self.quality.bounces.to_string();
         let mut arguments = vec!["render", &source, "-o", &radiance, "--profile", &profile, "--method", method];
         arguments.extend(["--size", &self.quality.size, "--bounces", &bounces, "--diffuse", "--quiet"]);
