@@ -132,7 +132,7 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
         (&["--set", "rays_per_element=9"], "one of 16, 64, 144, 256"),
         (&["--size", "0x10"], "a side is 1 to 16384 pixels"),
         (&["--env", "1,2"], "three numbers"),
-        (&["--spp", "4"], "applies to path-tracing only"),
+        (&["--spp", "0"], "0 is not in 1..=1048576"),
         (&["--exposure", "nan"], "a number from -32 to 32 stops"),
         (&["--seconds", "-1"], "a number from 0 to"),
         (&["--channels", "depth"], "needs an .exr"),
