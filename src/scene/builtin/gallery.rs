@@ -84,7 +84,7 @@ fn material(name: &str, color: [f32; 3], metallic: f32, roughness: f32) -> Mater
 
 fn materials() -> Vec<Material> {
     let mut skylight = material("skylight", [0.0; 3], 0.0, 1.0);
-    skylight.emission = Vec3::new(5.0, 5.7, 6.6);
+    skylight.emission = Vec3::new(12.0, 13.6, 15.6);
     vec![
         material("white wall", [0.78, 0.76, 0.72], 0.0, 1.0),
         material("oak floor", [0.46, 0.33, 0.21], 0.0, 0.4),
@@ -118,8 +118,8 @@ fn looking(from: [f32; 3], to: [f32; 3]) -> Transform {
 
 fn cameras(scene: &mut Scene) {
     for (name, eye, target, degrees) in [
-        ("main", [-6.4, 1.75, 0.55], [0.6, 1.3, -0.55], 60.0),
-        ("hall", [6.3, 3.4, 3.9], [-1.2, 0.9, -0.8], 62.0f32),
+        ("main", [6.7, 2.5, 0.3], [-1.6, 0.75, -0.25], 54.0f32),
+        ("hall", [-6.4, 1.75, 0.55], [0.6, 1.3, -0.55], 60.0),
         ("figure", [-3.4, 1.9, 0.2], [-5.2, 1.55, -2.1], 48.0),
     ] {
         let projection = Projection::Perspective { fov_y: degrees.to_radians(), near: 0.05, far: None };
@@ -131,9 +131,9 @@ fn cameras(scene: &mut Scene) {
 
 fn lights(scene: &mut Scene) {
     for (name, at, target, intensity) in [
-        ("spot on the figure", [-3.6, 4.7, -0.4], [-5.2, 1.4, -2.1], [70.0, 58.0, 42.0]),
-        ("spot on the flame", [-0.6, 4.7, -0.4], [-2.0, 1.4, -2.1], [60.0, 50.0, 36.0]),
-        ("spot on the lattice", [2.8, 4.7, -0.5], [4.4, 1.3, -2.1], [60.0, 50.0, 36.0]),
+        ("spot on the figure", [-3.6, 4.7, -0.4], [-5.2, 1.4, -2.1], [170.0, 142.0, 104.0]),
+        ("spot on the flame", [-0.6, 4.7, -0.4], [-2.0, 1.4, -2.1], [150.0, 125.0, 90.0]),
+        ("spot on the lattice", [2.8, 4.7, -0.5], [4.4, 1.3, -2.1], [150.0, 125.0, 90.0]),
     ] {
         let [inner_angle, outer_angle] = [16.0f32, 27.0].map(f32::to_radians);
         let kind = LightKind::Spot { inner_angle, outer_angle };

@@ -100,18 +100,18 @@ fn figure(p: Vec3) -> f32 {
     let rise = (p.y / 0.86).clamp(0.0, 1.0);
     let around = q.z.atan2(q.x);
     let folds = (around * 13.0 + 2.2 * (p.y * 3.1 + around).sin()).sin() + 0.5 * (around * 7.0 - p.y * 5.0).sin();
-    let radius = 0.285 - 0.125 * rise + 0.03 * (rise * 6.0).sin() * rise + 0.016 * (1.0 - 0.55 * rise) * folds;
+    let radius = 0.31 - 0.125 * rise + 0.03 * (rise * 6.0).sin() * rise + 0.016 * (1.0 - 0.55 * rise) * folds;
     let skirt = (Vec2::new(q.x, q.z * 1.15).length() - radius) * 0.55;
     let skirt = skirt.max((p.y - 0.43).abs() - 0.43);
     let flat = Vec3::new(q.x, q.y, q.z * 1.3);
     let mut body = blend(
-        limb(flat, [0.0, 0.84, 0.0], [0.005, 1.02, 0.0], 0.155, 0.118),
-        limb(flat, [0.005, 1.1, 0.0], [0.0, 1.24, -0.01], 0.132, 0.13),
+        limb(flat, [0.0, 0.84, 0.0], [0.005, 1.02, 0.0], 0.178, 0.13),
+        limb(flat, [0.005, 1.1, 0.0], [0.0, 1.24, -0.01], 0.146, 0.145),
         0.12,
     );
     let mirrored = Vec3::new(q.x.abs(), q.y, q.z);
-    body = blend(body, sphere(mirrored, [0.062, 1.16, 0.085], 0.058), 0.05);
-    body = blend(body, limb(mirrored, [0.13, 1.275, -0.01], [0.205, 1.12, -0.02], 0.062, 0.05), 0.07);
+    body = blend(body, sphere(mirrored, [0.07, 1.16, 0.09], 0.062), 0.05);
+    body = blend(body, limb(mirrored, [0.155, 1.275, -0.01], [0.225, 1.1, -0.02], 0.066, 0.055), 0.07);
     body = blend(body, limb(q, [0.0, 1.28, -0.015], [0.012, 1.42, 0.0], 0.06, 0.05), 0.05);
     let turned = Vec3::new(q.x * 0.94 + q.z * 0.34, q.y, q.z * 0.94 - q.x * 0.34);
     let mut face = blend(
@@ -123,7 +123,7 @@ fn figure(p: Vec3) -> f32 {
     face = blend(face, sphere(turned, [0.0, 1.58, -0.025], 0.092) + curls, 0.02);
     face = blend(face, sphere(turned, [0.0, 1.57, -0.125], 0.045) + curls, 0.02);
     body = blend(body, face, 0.03);
-    blend(blend(skirt, body, 0.05), base(p, 0.32), 0.03)
+    blend(blend(skirt, body, 0.05), base(p, 0.35), 0.03)
 }
 
 /// A trefoil standing upright, its strand ridged.

@@ -38,7 +38,7 @@ struct Palette {
 
 pub fn church() -> Document {
     let mut document = Document::new("church");
-    document.camera("main", [-0.9, 2.0, -1.6], [0.35, 3.6, -14.0], 64.0);
+    document.camera("main", [1.1, 2.0, -1.6], [-0.45, 3.6, -14.0], 64.0);
     document.camera("aisle", [-6.1, 1.8, -1.2], [-3.4, 2.3, -12.0], 58.0);
     document.camera("apse", [1.6, 2.2, -15.5], [-0.3, 3.4, -25.0], 60.0);
     document.camera("west", [0.0, 3.2, -22.5], [0.4, 4.4, -8.0], 66.0);

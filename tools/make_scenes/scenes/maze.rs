@@ -36,7 +36,7 @@ pub fn maze() -> Document {
     document.camera("corridor", [-4.4, 1.75, 5.5], [0.6, 0.6, -0.8], 60.0);
     document.camera("light court", [-4.6, 2.4, -5.2], [1.0, 0.8, -4.3], 65.0);
     // The sun crosses the slot and meets the far side of the tall partition between floor and two metres.
-    document.sun("sun", [0.0, -1.0, 0.34], [270.0, 254.0, 222.0]);
+    document.sun("sun", [0.0, -1.0, 0.34], [400.0, 376.0, 328.0]);
 
     let plaster = document.material("plaster", Material::matte(0.76, 0.74, 0.7));
     let floor = document.material("floor", Material::matte(0.5, 0.47, 0.43));

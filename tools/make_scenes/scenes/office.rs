@@ -79,7 +79,7 @@ fn window(document: &mut Document) {
     let view = document.texture("view", 128, outdoors);
     let sky = Material { emission_texture: Some(view), ..Material::light(11.0, 11.0, 11.0) };
     let sky = document.material("view", sky);
-    let corners = [[-5.75, -0.2, 3.0], [-5.75, -0.2, -5.0], [-5.75, 3.3, -5.0], [-5.75, 3.3, 3.0]];
+    let corners = [[-5.75, 0.4, 2.75], [-5.75, 0.4, -3.7], [-5.75, 3.25, -3.7], [-5.75, 3.25, 2.75]];
     let mut backdrop = Shape::quad(corners.map(Vec3::from));
     backdrop.uv = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]].map(Vec2::from).to_vec();
     document.add("view", sky, backdrop);
