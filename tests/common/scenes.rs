@@ -8,22 +8,10 @@ pub fn lambert(albedo: Vec3) -> Material {
     Material {
         name: "lambert".into(),
         base_color: albedo.extend(1.0),
-        base_color_texture: None,
         metallic: 0.0,
-        roughness: 1.0,
-        metallic_roughness_texture: None,
-        normal_texture: None,
-        normal_scale: 1.0,
-        occlusion_texture: None,
-        occlusion_strength: 1.0,
-        emission: Vec3::ZERO,
-        emission_texture: None,
-        alpha_cutoff: None,
-        double_sided: true,
-        unlit: false,
-        ior: 1.5,
         specular: 0.0,
-        specular_color: Vec3::ONE,
+        double_sided: true,
+        ..Material::default()
     }
 }
 
