@@ -184,10 +184,6 @@ impl<'c> LinkBuilder<'c> {
         outcomes: &Outcomes,
     ) {
         let batch_count = batch.len() as u32;
-        let unit_divisor = match self.links.format {
-            LinkFormat::Full => 1,
-            LinkFormat::Packed => RAY_UNITS * self.ray_count / PACKED_UNITS,
-        };
         let pass = passes::MergeHits {
             hits,
             triangles,
@@ -196,8 +192,16 @@ impl<'c> LinkBuilder<'c> {
             row_counts: &self.row_counts,
             escaped: &outcomes.escaped,
             outcomes: &outcomes.counts,
-            constants: passes::MergeHitsConstants { rays: self.ray_count },
-            params: passes::MergeHitsParams { first_element: batch.start, batch_count, unit_divisor },
+            // As many buckets as fit in 32 KiB beside the table of 1024 rays.
+            constants: passes::MergeHitsConstants {
+                rays: self.ray_count,
+                buckets: if self.ray_count > 576 { 256 } else { 1024 },
+            },
+            params: passes::MergeHitsParams {
+                first_element: batch.start,
+                batch_count,
+                element_count: self.element_count,
+            },
         };
         recorder.dispatch(&pass, batch_count * passes::MergeHits::PROGRAM.workgroup[0]);
         // One value more than there are counts: the total.
@@ -250,9 +254,10 @@ impl<'c> LinkBuilder<'c> {
                         row_capacity,
                         link_base,
                         window_base,
+                        unit_divisor: RAY_UNITS * self.ray_count / PACKED_UNITS,
                     },
                 },
-                threads,
+                batch_count,
             ),
         }
         recorder.submit()?;
