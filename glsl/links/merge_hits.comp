@@ -24,7 +24,7 @@ layout(set = 0, binding = 6, scalar) writeonly buffer Outcomes { uint outcomes[]
 layout(push_constant, scalar) uniform Params {
     uint first_element;
     uint batch_count;
-    uint element_count;
+    uint sender_count;
 } params;
 
 const uint CAPACITY = 3 * RAYS;
@@ -43,7 +43,7 @@ shared uint sh_escaped_count;
 // Rises with the sender, so that buckets are in order.
 uint bucket_of(uint sender)
 {
-    return min(uint(float(sender) * (float(BUCKETS) / float(params.element_count))), BUCKETS - 1);
+    return min(uint(float(sender) * (float(BUCKETS) / float(params.sender_count))), BUCKETS - 1);
 }
 
 uint slot_at(uint index) { return sh_slots[index / 2] >> (index % 2 * 16) & 0xffffu; }

@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/link.glsl"
 
@@ -8,7 +9,7 @@
 layout(local_size_x = 32) in;
 layout(set = 0, binding = 0, scalar) readonly buffer RowOffsets { uint row_offsets[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer RowEntries { RowEntry row_entries[]; };
-layout(set = 0, binding = 2, scalar) writeonly buffer Links { Link links[]; };
+layout(set = 0, binding = 2, scalar) writeonly buffer Links { uint64_t links[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer LinkOffsets { uint link_offsets[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_element;
@@ -27,7 +28,8 @@ void main()
     uint first = row_offsets[row], count = row_offsets[row + 1] - first;
     for (uint k = gl_LocalInvocationID.x; k < count; k += 32) {
         RowEntry entry = row_entries[row * params.row_capacity + k];
-        links[params.window_base + first + k] = Link(entry.sender, float(entry.weight) * params.unit_weight);
+        links[params.window_base + first + k] =
+            packUint2x32(uvec2(entry.sender, floatBitsToUint(float(entry.weight) * params.unit_weight)));
     }
     if (gl_LocalInvocationID.x == 0) {
         link_offsets[params.first_element + row] = params.link_base + first;

@@ -6,7 +6,7 @@
 
 use super::scan::{self, ScanScratch};
 use crate::gpu::shaders::links as passes;
-use crate::gpu::shaders::types::{Hit, Link, RowEntry};
+use crate::gpu::shaders::types::{Hit, RowEntry};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use glam::UVec3;
 use std::ops::Range;
@@ -25,7 +25,8 @@ pub const MAX_RAYS: u32 = 1024;
 pub enum LinkFormat {
     /// Sender and f32 weight, 8 bytes.
     Full,
-    /// 20 bits of sender and 12 of weight, 4 bytes. A weight is off by 1/4096 at most; sums of rows are kept.
+    /// 20 bits of sender and 12 of weight, 4 bytes. A weight is off by 1/4096 at most; sums of rows are kept. What is
+    /// sent along them is rounded too, by 1/512 of the brightest channel at most.
     Packed,
 }
 
@@ -45,54 +46,81 @@ pub enum LinkError {
     TooMany(u64),
 }
 
-/// The links of some consecutive receivers.
-pub struct LinkWindow {
+/// A link from a receiver to one sender, and its weight: the form factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    pub sender: u32,
+    pub weight: f32,
+}
+
+impl Link {
+    /// As stored in [`LinkFormat::Full`].
+    pub fn from_word(word: u64) -> Self {
+        Self { sender: word as u32, weight: f32::from_bits((word >> 32) as u32) }
+    }
+
+    /// As stored in [`LinkFormat::Packed`].
+    pub fn from_packed(word: u32) -> Self {
+        Self { sender: word / PACKED_UNITS, weight: (word % PACKED_UNITS) as f32 / PACKED_UNITS as f32 }
+    }
+}
+
+/// The links of some consecutive receivers, a word each; some room may be left at the end.
+pub struct LinkWindow<W> {
     pub first_element: u32,
     pub element_count: u32,
     /// Links of the windows before.
     pub first_link: u32,
     pub link_count: u32,
-    pub table: LinkTable,
+    pub words: Buffer<W>,
 }
 
-/// The links themselves; some room may be left at the end.
-pub enum LinkTable {
-    Full(Buffer<Link>),
-    Packed(Buffer<u32>),
+/// Windows in order of receivers, without gaps, and room for what is sent along their links ([`super::gather`]).
+pub struct LinkSet<W> {
+    pub windows: Vec<LinkWindow<W>>,
+    /// Radiosity of each sender, a word as long as a link.
+    pub sent: Buffer<W>,
 }
 
-impl LinkTable {
-    fn new(context: &Context, format: LinkFormat, index: usize, capacity: usize) -> Result<Self, GpuError> {
-        let name = format!("links/window {index}");
-        Ok(match format {
-            LinkFormat::Full => Self::Full(context.buffer(&name, capacity)?),
-            LinkFormat::Packed => Self::Packed(context.buffer(&name, capacity)?),
-        })
+impl<W> LinkSet<W> {
+    fn new(context: &Context, sender_count: u32) -> Result<Self, GpuError> {
+        Ok(Self { windows: Vec::new(), sent: context.buffer("links/sent", sender_count as usize)? })
     }
 
-    /// Links that fit.
-    pub fn capacity(&self) -> usize {
-        match self {
-            Self::Full(table) => table.len(),
-            Self::Packed(table) => table.len(),
-        }
+    fn size_bytes(&self) -> u64 {
+        self.sent.size_bytes() + self.windows.iter().map(|w| w.words.size_bytes()).sum::<u64>()
     }
 
-    pub fn size_bytes(&self) -> u64 {
-        match self {
-            Self::Full(table) => table.size_bytes(),
-            Self::Packed(table) => table.size_bytes(),
+    /// The last window, or a new one of `capacity` links where that has no room for `count` more.
+    fn window_for(
+        &mut self,
+        context: &Context,
+        first_element: u32,
+        count: u32,
+        capacity: impl FnOnce() -> Result<usize, LinkError>,
+    ) -> Result<&mut LinkWindow<W>, LinkError> {
+        let room = self.windows.last().map(|w| w.words.len() - w.link_count as usize);
+        if room.is_none_or(|room| room < count as usize) {
+            let first_link = self.windows.last().map_or(0, |w| w.first_link + w.link_count);
+            let words = context.buffer(&format!("links/window {}", self.windows.len()), capacity()?)?;
+            self.windows.push(LinkWindow { first_element, element_count: 0, first_link, link_count: 0, words });
         }
+        let last = self.windows.len() - 1;
+        Ok(&mut self.windows[last])
     }
+}
+
+/// The links in their format.
+pub enum LinkWords {
+    Full(LinkSet<u64>),
+    Packed(LinkSet<u32>),
 }
 
 /// All links of a scene.
 pub struct Links {
-    pub format: LinkFormat,
     /// `element_count + 1` entries over all windows, the first 0.
     pub offsets: Buffer<u32>,
-    /// In order of receivers, without gaps.
-    pub windows: Vec<LinkWindow>,
+    pub words: LinkWords,
     pub element_count: u32,
     pub link_count: u32,
 }
@@ -100,7 +128,47 @@ pub struct Links {
 impl Links {
     /// Bytes allocated.
     pub fn size_bytes(&self) -> u64 {
-        self.offsets.size_bytes() + self.windows.iter().map(|w| w.table.size_bytes()).sum::<u64>()
+        let words = match &self.words {
+            LinkWords::Full(set) => set.size_bytes(),
+            LinkWords::Packed(set) => set.size_bytes(),
+        };
+        self.offsets.size_bytes() + words
+    }
+
+    pub fn window_count(&self) -> usize {
+        match &self.words {
+            LinkWords::Full(set) => set.windows.len(),
+            LinkWords::Packed(set) => set.windows.len(),
+        }
+    }
+
+    /// Gives the windows' memory back.
+    pub fn clear(&mut self) {
+        match &mut self.words {
+            LinkWords::Full(set) => set.windows.clear(),
+            LinkWords::Packed(set) => set.windows.clear(),
+        }
+        self.link_count = 0;
+    }
+
+    /// All links, for tests and views; offsets into them are [`Self::offsets`].
+    pub fn download(&self, context: &Context) -> Result<Vec<Link>, GpuError> {
+        let mut links = Vec::with_capacity(self.link_count as usize);
+        match &self.words {
+            LinkWords::Full(set) => {
+                for window in &set.windows {
+                    let words = context.download_range(&window.words, 0..window.link_count as usize)?;
+                    links.extend(words.into_iter().map(Link::from_word));
+                }
+            }
+            LinkWords::Packed(set) => {
+                for window in &set.windows {
+                    let words = context.download_range(&window.words, 0..window.link_count as usize)?;
+                    links.extend(words.into_iter().map(Link::from_packed));
+                }
+            }
+        }
+        Ok(links)
     }
 }
 
@@ -122,58 +190,63 @@ impl Outcomes {
     }
 }
 
-/// Builds [`Links`] from batches of hits, in order of elements: [`Self::merge`], submit, [`Self::append`].
+/// How many of what a [`LinkBuilder`] links.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LinkCounts {
+    pub receivers: u32,
+    /// Senders have indices below this.
+    pub senders: u32,
+    /// Rays per receiver, at most [`MAX_RAYS`].
+    pub rays: u32,
+    /// Receivers of a batch.
+    pub batch: u32,
+}
+
+/// Builds [`Links`] from batches of hits, in order of receivers: [`Self::merge`], submit, [`Self::append`].
 pub struct LinkBuilder<'c> {
     context: &'c Context,
-    element_count: u32,
-    ray_count: u32,
+    counts: LinkCounts,
     budget: u64,
-    /// `batch_capacity` rows of `3 * ray_count`.
+    /// A row of `3 * rays` for each receiver of a batch.
     row_entries: Buffer<RowEntry>,
-    /// `batch_capacity + 1`; counts, then offsets within the batch.
+    /// One more than a batch; counts, then offsets within the batch.
     row_counts: Buffer<u32>,
     scan: ScanScratch,
     links: Links,
 }
 
 impl<'c> LinkBuilder<'c> {
-    /// Scratch bytes per element of a batch.
+    /// Scratch bytes per receiver of a batch.
     pub fn batch_bytes(ray_count: u32) -> u64 {
         u64::from(3 * ray_count) * size_of::<RowEntry>() as u64
     }
 
-    /// `budget`: bytes that links may take. `ray_count` is at most [`MAX_RAYS`].
-    pub fn new(
-        context: &'c Context,
-        format: LinkFormat,
-        element_count: u32,
-        ray_count: u32,
-        batch_capacity: u32,
-        budget: u64,
-    ) -> Result<Self, LinkError> {
-        if format == LinkFormat::Packed && element_count > PACKED_ELEMENTS {
-            return Err(LinkError::TooManyForPacked(element_count));
+    /// `budget`: bytes that links may take.
+    pub fn new(context: &'c Context, format: LinkFormat, counts: LinkCounts, budget: u64) -> Result<Self, LinkError> {
+        if format == LinkFormat::Packed && counts.senders > PACKED_ELEMENTS {
+            return Err(LinkError::TooManyForPacked(counts.senders));
         }
-        let rows = batch_capacity as usize;
+        let rows = counts.batch as usize;
         Ok(Self {
             context,
-            element_count,
-            ray_count,
+            counts,
             budget,
-            row_entries: context.buffer("links/row entries", rows * 3 * ray_count as usize)?,
+            row_entries: context.buffer("links/row entries", rows * 3 * counts.rays as usize)?,
             row_counts: context.buffer("links/row counts", rows + 1)?,
             scan: ScanScratch::new(context, "links", rows + 1)?,
             links: Links {
-                format,
-                offsets: context.upload("links/offsets", &vec![0; element_count as usize + 1])?,
-                windows: Vec::new(),
-                element_count,
+                offsets: context.upload("links/offsets", &vec![0; counts.receivers as usize + 1])?,
+                words: match format {
+                    LinkFormat::Full => LinkWords::Full(LinkSet::new(context, counts.senders)?),
+                    LinkFormat::Packed => LinkWords::Packed(LinkSet::new(context, counts.senders)?),
+                },
+                element_count: counts.receivers,
                 link_count: 0,
             },
         })
     }
 
-    /// Turns the hits of the elements of `batch` into rows.
+    /// Turns the hits of the receivers of `batch` into rows.
     pub fn merge(
         &self,
         recorder: &mut Recorder<'_>,
@@ -194,13 +267,13 @@ impl<'c> LinkBuilder<'c> {
             outcomes: &outcomes.counts,
             // As many buckets as fit in 32 KiB beside the table of 1024 rays.
             constants: passes::MergeHitsConstants {
-                rays: self.ray_count,
-                buckets: if self.ray_count > 576 { 256 } else { 1024 },
+                rays: self.counts.rays,
+                buckets: if self.counts.rays > 576 { 256 } else { 1024 },
             },
             params: passes::MergeHitsParams {
                 first_element: batch.start,
                 batch_count,
-                element_count: self.element_count,
+                sender_count: self.counts.senders,
             },
         };
         recorder.dispatch(&pass, batch_count * passes::MergeHits::PROGRAM.workgroup[0]);
@@ -214,89 +287,58 @@ impl<'c> LinkBuilder<'c> {
         let total = self.context.download_range(&self.row_counts, batch.len()..batch.len() + 1)?[0];
         let link_count = u64::from(self.links.link_count) + u64::from(total);
         let after = u32::try_from(link_count).map_err(|_| LinkError::TooMany(link_count))?;
-        let room = self.links.windows.last().map_or(0, |w| w.table.capacity() - w.link_count as usize);
-        if self.links.windows.is_empty() || room < total as usize {
-            self.open_window(&batch, total)?;
-        }
-        let Some(window) = self.links.windows.last_mut() else { return Ok(()) };
 
-        let mut recorder = self.context.recorder("links")?;
-        let threads = batch_count * passes::WriteRows::PROGRAM.workgroup[0];
-        let row_capacity = 3 * self.ray_count;
-        let (link_base, window_base) = (self.links.link_count, window.link_count);
-        match &window.table {
-            LinkTable::Full(links) => recorder.dispatch(
-                &passes::WriteRows {
+        let (context, held) = (self.context, self.links.size_bytes());
+        let (link_base, row_capacity) = (self.links.link_count, 3 * self.counts.rays);
+        let capacity = |link_bytes| {
+            let budget = self.budget.saturating_sub(held).min(context.available_bytes());
+            window_capacity(context, &self.counts, &batch, total, link_base, link_bytes, (held, budget))
+        };
+        let mut recorder = context.recorder("links")?;
+        match &mut self.links.words {
+            LinkWords::Full(set) => {
+                let window = set.window_for(context, batch.start, total, || capacity(size_of::<u64>() as u64))?;
+                let pass = passes::WriteRows {
                     row_offsets: &self.row_counts,
                     row_entries: &self.row_entries,
-                    links,
+                    links: &window.words,
                     link_offsets: &self.links.offsets,
                     params: passes::WriteRowsParams {
                         first_element: batch.start,
                         batch_count,
                         row_capacity,
                         link_base,
-                        window_base,
-                        unit_weight: 1.0 / (RAY_UNITS * self.ray_count) as f32,
+                        window_base: window.link_count,
+                        unit_weight: 1.0 / (RAY_UNITS * self.counts.rays) as f32,
                     },
-                },
-                threads,
-            ),
-            LinkTable::Packed(packed_links) => recorder.dispatch(
-                &passes::WritePackedRows {
+                };
+                recorder.dispatch(&pass, batch_count * passes::WriteRows::PROGRAM.workgroup[0]);
+                window.element_count += batch_count;
+                window.link_count += total;
+            }
+            LinkWords::Packed(set) => {
+                let window = set.window_for(context, batch.start, total, || capacity(size_of::<u32>() as u64))?;
+                let pass = passes::WritePackedRows {
                     row_offsets: &self.row_counts,
                     row_entries: &self.row_entries,
-                    packed_links,
+                    packed_links: &window.words,
                     link_offsets: &self.links.offsets,
                     params: passes::WritePackedRowsParams {
                         first_element: batch.start,
                         batch_count,
                         row_capacity,
                         link_base,
-                        window_base,
-                        unit_divisor: RAY_UNITS * self.ray_count / PACKED_UNITS,
+                        window_base: window.link_count,
+                        unit_divisor: RAY_UNITS * self.counts.rays / PACKED_UNITS,
                     },
-                },
-                batch_count,
-            ),
+                };
+                recorder.dispatch(&pass, batch_count);
+                window.element_count += batch_count;
+                window.link_count += total;
+            }
         }
         recorder.submit()?;
-        window.element_count += batch_count;
-        window.link_count += total;
         self.links.link_count = after;
-        Ok(())
-    }
-
-    /// Makes room for the rest of the rows, judged by this batch, and in any case for the batch itself.
-    fn open_window(&mut self, batch: &Range<u32>, total: u32) -> Result<(), LinkError> {
-        let link_bytes = match self.links.format {
-            LinkFormat::Full => size_of::<Link>() as u64,
-            LinkFormat::Packed => size_of::<u32>() as u64,
-        };
-        let remaining = u64::from(self.element_count - batch.start);
-        let expected = (u64::from(total) * remaining).div_ceil(batch.len().max(1) as u64);
-        // A little more where it is a guess.
-        let wanted = if batch.end == self.element_count { u64::from(total) } else { expected + expected / 64 };
-        let largest = self.context.limits().storage_buffer_bytes / link_bytes;
-        let available = self.budget.saturating_sub(self.links.size_bytes()).min(self.context.available_bytes());
-        if expected * link_bytes > available {
-            let counted = batch.end;
-            return Err(LinkError::OutOfMemory {
-                needed: self.links.size_bytes() + expected * link_bytes,
-                available: available + self.links.size_bytes(),
-                per_element: (f64::from(self.links.link_count) + f64::from(total)) / f64::from(counted),
-                counted,
-                element_count: self.element_count,
-            });
-        }
-        let capacity = wanted.min(available / link_bytes).min(largest).max(u64::from(total));
-        self.links.windows.push(LinkWindow {
-            first_element: batch.start,
-            element_count: 0,
-            first_link: self.links.link_count,
-            link_count: 0,
-            table: LinkTable::new(self.context, self.links.format, self.links.windows.len(), capacity as usize)?,
-        });
         Ok(())
     }
 
@@ -304,4 +346,32 @@ impl<'c> LinkBuilder<'c> {
     pub fn finish(self) -> Links {
         self.links
     }
+}
+
+/// Links that a new window should hold: for all the rest of the rows, judged by this batch, and in any case for the
+/// batch itself. `memory`: bytes held by links already, bytes that may be taken.
+fn window_capacity(
+    context: &Context,
+    counts: &LinkCounts,
+    batch: &Range<u32>,
+    total: u32,
+    before: u32,
+    link_bytes: u64,
+    (held, available): (u64, u64),
+) -> Result<usize, LinkError> {
+    let total = u64::from(total);
+    let expected = (total * u64::from(counts.receivers - batch.start)).div_ceil(batch.len().max(1) as u64);
+    if expected * link_bytes > available {
+        return Err(LinkError::OutOfMemory {
+            needed: held + expected * link_bytes,
+            available: held + available,
+            per_element: (u64::from(before) + total) as f64 / f64::from(batch.end),
+            counted: batch.end,
+            element_count: counts.receivers,
+        });
+    }
+    // A little more where it is a guess.
+    let wanted = if batch.end == counts.receivers { total } else { expected + expected / 64 };
+    let largest = context.limits().storage_buffer_bytes / link_bytes;
+    Ok(wanted.min(available / link_bytes).min(largest).max(total) as usize)
 }

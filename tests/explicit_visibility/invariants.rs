@@ -2,14 +2,14 @@
 
 use crate::common::TestContext;
 use crate::fixture::{Fixture, builtin_scene};
-use crate::kernels_links::download;
 use linklight::gpu::Options;
 use linklight::methods::explicit_visibility::{ExplicitError, ExplicitVisibility, Settings};
 
 /// Checks rows and returns (links, lightest, heaviest row sum).
 fn validate(context: &TestContext, method: &ExplicitVisibility, slack: f32) -> (usize, f32, f32) {
     let links = method.links();
-    let (offsets, all) = download(context, links);
+    let offsets = context.download(&links.offsets).unwrap();
+    let all = links.download(context).unwrap();
     let counts = context.download(&method.outcomes().counts).unwrap();
     let ray_count = method.settings().rays_per_element.get();
     assert!(offsets.is_sorted(), "offsets rise");
@@ -75,8 +75,9 @@ fn a_low_buffer_limit_gives_the_same_links_in_more_windows() {
     let links = |context: &TestContext| {
         let fixture = Fixture::new(context, builtin_scene("cornell-box"), Some(0.4));
         let method = fixture.prepare(context, Settings::default());
-        let (offsets, links) = download(context, method.links());
-        (method.links().windows.len(), offsets, links, context.download(&method.outcomes().escaped).unwrap())
+        let offsets = context.download(&method.links().offsets).unwrap();
+        let links = method.links().download(context).unwrap();
+        (method.links().window_count(), offsets, links, context.download(&method.outcomes().escaped).unwrap())
     };
     let (one, many) = (links(&whole), links(&small));
     assert_eq!(one.0, 1);

@@ -5,10 +5,10 @@ use crate::meshes::{assert_close, points};
 use crate::twins::links::{self as twins, PACKED_UNITS, RAY_UNITS};
 use glam::{UVec3, Vec2, Vec3};
 use linklight::gpu::Options;
-use linklight::gpu::shaders::types::{Hit, Link};
+use linklight::gpu::shaders::types::Hit;
 use linklight::stages::elements::NO_ELEMENT;
 use linklight::stages::gather;
-use linklight::stages::links::{LinkBuilder, LinkError, LinkFormat, LinkTable, Links, Outcomes};
+use linklight::stages::links::{Link, LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
 use linklight::stages::trace::{BACK_FACE, NO_HIT};
 
 const VERTICES: u32 = 300;
@@ -65,7 +65,7 @@ fn build(
     let triangles = context.upload("test/triangles", &triangles).unwrap();
     let back_elements = context.upload("test/backs", &input.back_elements).unwrap();
     let outcomes = Outcomes::new(context, elements, ray_count).unwrap();
-    let mut builder = LinkBuilder::new(context, format, elements, ray_count, batch, u64::MAX).unwrap();
+    let mut builder = LinkBuilder::new(context, format, counts(elements, ray_count, batch), u64::MAX).unwrap();
     for first in (0..elements).step_by(batch as usize) {
         let range = first..elements.min(first + batch);
         let rays = |e: u32| (e * ray_count) as usize;
@@ -78,19 +78,8 @@ fn build(
     (builder.finish(), outcomes)
 }
 
-/// All windows as one list of plain links.
-pub fn download(context: &TestContext, links: &Links) -> (Vec<u32>, Vec<Link>) {
-    let mut all = Vec::new();
-    for window in &links.windows {
-        let count = window.link_count as usize;
-        match &window.table {
-            LinkTable::Full(table) => all.extend(context.download_range(table, 0..count).unwrap()),
-            LinkTable::Packed(table) => {
-                all.extend(context.download_range(table, 0..count).unwrap().into_iter().map(twins::unpacked));
-            }
-        }
-    }
-    (context.download(&links.offsets).unwrap(), all)
+fn counts(receivers: u32, rays: u32, batch: u32) -> LinkCounts {
+    LinkCounts { receivers, senders: VERTICES + 100, rays, batch }
 }
 
 #[test]
@@ -104,7 +93,8 @@ fn rows_agree_with_their_twin_to_the_bit() {
         let input = random_hits(&mut random, (elements * ray_count) as usize, triangle_count);
         for format in [LinkFormat::Full, LinkFormat::Packed] {
             let (links, outcomes) = build(&context, &input, format, elements, ray_count, batch);
-            let (offsets, device) = download(&context, &links);
+            let offsets = context.download(&links.offsets).unwrap();
+            let device = links.download(&context).unwrap();
             let escaped = context.download(&outcomes.escaped).unwrap();
             let counts = context.download(&outcomes.counts).unwrap();
             let words = ray_count.div_ceil(32) as usize;
@@ -144,18 +134,29 @@ fn gathering_agrees_with_its_twin_over_any_windows() {
         let context = TestContext::with(Options { max_storage_buffer_bytes: limit, ..Options::default() });
         for elements in [1, 63, 64, 65, 257] {
             let input = random_hits(&mut random, (elements * 64) as usize, 400);
-            let radiosity = points(&mut random, VERTICES + 100);
+            let mut radiosity: Vec<Vec3> = points(&mut random, VERTICES + 100).iter().map(|b| b.abs()).collect();
+            (radiosity[0], radiosity[1]) = (Vec3::ZERO, Vec3::new(3.9999998, 1e-12, 0.0));
             for format in [LinkFormat::Full, LinkFormat::Packed] {
                 let (links, _) = build(&context, &input, format, elements, 64, 16);
-                assert!(elements < 257 || limit.is_none() || links.windows.len() > 1, "several windows");
+                assert!(elements < 257 || limit.is_none() || links.window_count() > 1, "several windows");
                 let sent = context.upload("test/radiosity", &radiosity).unwrap();
                 let irradiance = context.buffer::<Vec3>("test/irradiance", elements as usize).unwrap();
                 let mut recorder = context.recorder("test").unwrap();
                 gather::over_links(&mut recorder, &links, &sent, &irradiance);
                 recorder.submit().unwrap();
-                let (offsets, plain) = download(&context, &links);
-                let twin = twins::gather(&offsets, &plain, &radiosity);
-                assert_close("gather", &context.download(&irradiance).unwrap(), &twin, 1e-6, 1e-5);
+                let offsets = context.download(&links.offsets).unwrap();
+                let plain = links.download(&context).unwrap();
+                // What is sent is rounded by half a unit of the brightest channel: below 4, and weights sum to 1.
+                let (bits, rounding) = match format {
+                    LinkFormat::Full => (18, 4.0 / (1 << 18) as f32),
+                    LinkFormat::Packed => (8, 4.0 / (1 << 8) as f32),
+                };
+                let device = context.download(&irradiance).unwrap();
+                let exact = twins::gather(&offsets, &plain, &radiosity);
+                assert_close("gather", &device, &exact, 0.5 * rounding + 1e-6, 1e-5);
+                let rounded: Vec<Vec3> = radiosity.iter().map(|b| twins::shared_exponent(*b, bits)).collect();
+                let twin = twins::gather(&offsets, &plain, &rounded);
+                assert_close("gather of rounded radiosity", &device, &twin, 1e-6, 1e-5);
             }
         }
     }
@@ -171,7 +172,7 @@ fn what_does_not_fit_is_refused_with_figures() {
     let back_elements = context.upload("test/backs", &input.back_elements).unwrap();
     let hits = context.upload("test/hits", &input.hits).unwrap();
     let outcomes = Outcomes::new(&context, 64, 64).unwrap();
-    let mut builder = LinkBuilder::new(&context, LinkFormat::Full, 64, 64, 32, 20_000).unwrap();
+    let mut builder = LinkBuilder::new(&context, LinkFormat::Full, counts(64, 64, 32), 20_000).unwrap();
     let mut recorder = context.recorder("test").unwrap();
     builder.merge(&mut recorder, 0..32, &hits, &triangles, &back_elements, &outcomes);
     recorder.submit().unwrap();
@@ -182,6 +183,7 @@ fn what_does_not_fit_is_refused_with_figures() {
         }
         other => panic!("{other:?}"),
     }
-    let refused = LinkBuilder::new(&context, LinkFormat::Packed, (1 << 20) + 1, 16, 1, u64::MAX).err().unwrap();
+    let too_many = LinkCounts { senders: (1 << 20) + 1, ..counts(1, 16, 1) };
+    let refused = LinkBuilder::new(&context, LinkFormat::Packed, too_many, u64::MAX).err().unwrap();
     assert!(refused.to_string().contains("packed_links=false"), "{refused}");
 }

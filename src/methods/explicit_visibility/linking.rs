@@ -6,7 +6,7 @@ use crate::gpu::shaders::types::{Hit, Ray};
 use crate::gpu::{Context, GpuError};
 use crate::scene::environment::Environment;
 use crate::stages::elements::{ElementTopology, Elements};
-use crate::stages::links::{LinkBuilder, LinkError, LinkFormat, Links, Outcomes};
+use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
 use crate::stages::trace;
 use crate::stages::world::WorldEnvironment;
 
@@ -86,7 +86,8 @@ pub(super) fn build(
     let rays = context.buffer("links/rays", (batch * ray_count) as usize)?;
     let hits = context.buffer("links/hits", rays.len())?;
     let format = if settings.packed_links { LinkFormat::Packed } else { LinkFormat::Full };
-    let mut builder = LinkBuilder::new(context, format, elements.count, ray_count, batch, sizes.link_budget)?;
+    let counts = LinkCounts { receivers: elements.count, senders: elements.count, rays: ray_count, batch };
+    let mut builder = LinkBuilder::new(context, format, counts, sizes.link_budget)?;
     for first_element in (0..elements.count).step_by(batch as usize) {
         let range = first_element..elements.count.min(first_element + batch);
         let batch_rays = range.len() * ray_count as usize;

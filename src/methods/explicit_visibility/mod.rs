@@ -68,7 +68,7 @@ crate::settings! {
         emitters: EmitterChoice = EmitterChoice::Auto, paper "area lights only mentioned";
         /// Points on sampled emitters, together; each element casts a shadow ray to every one.
         emitter_samples: u32 = 32, range 1..=1024, unit "points", paper "not given";
-        /// Store links in 4 bytes instead of 8: faster to read, weights off by 1/4096 at most.
+        /// Store links in 4 bytes instead of 8: faster; weights off by 1/4096, radiosity by 1/512 at most.
         packed_links: bool = false, paper "off";
         /// How far rays start off their surface, as a share of the scene's extent.
         ray_offset: f32 = 1e-5, range 1e-7..=1e-2, paper "not given";
@@ -164,7 +164,7 @@ impl ExplicitVisibility {
         self.elements.update_materials(&mut recorder, stage.world);
         recorder.submit()?;
         // The old links go first: two sets may not fit.
-        self.links.windows.clear();
+        self.links.clear();
         self.links = linking::build(context, stage, &self.settings, &self.elements, &self.outcomes, &self.sizes)?;
         self.report =
             Report::new(context, &self.settings, &self.elements, &self.emitters, &self.links, &self.outcomes)?;

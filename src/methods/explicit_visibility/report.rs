@@ -83,7 +83,7 @@ impl Report {
             links: links.link_count,
             compression: raw_links as f64 / f64::from(links.link_count.max(1)),
             link_bytes: links.size_bytes(),
-            link_windows: links.windows.len() as u32,
+            link_windows: links.window_count() as u32,
             sampled_parts: emitters.plan.sampled_parts,
             linked_parts: emitters.plan.linked_parts,
             emitter_samples: emitters.plan.samples.len() as u32,

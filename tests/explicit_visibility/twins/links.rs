@@ -1,8 +1,9 @@
 //! Twins of glsl/links/ and glsl/gather/.
 
 use glam::Vec3;
-use linklight::gpu::shaders::types::{Hit, Link};
+use linklight::gpu::shaders::types::Hit;
 use linklight::stages::elements::NO_ELEMENT;
+use linklight::stages::links::Link;
 use linklight::stages::trace::{BACK_FACE, NO_HIT};
 use std::collections::BTreeMap;
 
@@ -59,7 +60,14 @@ pub fn gather(offsets: &[u32], links: &[Link], radiosity: &[Vec3]) -> Vec<Vec3> 
     (0..offsets.len() - 1).map(irradiance).collect()
 }
 
-/// A packed link as a plain one.
-pub fn unpacked(link: u32) -> Link {
-    Link { sender: link >> 12, weight: (link & 0xfff) as f32 / PACKED_UNITS as f32 }
+/// A colour as its channels come back from three mantissas of `bits` bits under the exponent of the brightest.
+pub fn shared_exponent(color: Vec3, bits: i32) -> Vec3 {
+    let largest = color.max_element();
+    if largest <= 1e-30 {
+        return Vec3::ZERO;
+    }
+    // The next power of two above it.
+    let exponent = (largest.to_bits() >> 23) as i32 - 126;
+    let unit = 2f32.powi(exponent - bits);
+    color.map(|c| (c / unit + 0.5).floor().min(2f32.powi(bits) - 1.0) * unit)
 }
