@@ -28,7 +28,7 @@ crate::choice! {
 }
 
 /// Largest share of the scene's area of a part that [`EmitterChoice::Auto`] samples.
-const SMALL_PART: f32 = 0.05;
+const SMALL_PART: f64 = 0.05;
 
 /// Which parts are sampled, and where.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -41,12 +41,11 @@ pub struct EmitterPlan {
 }
 
 impl EmitterPlan {
-    /// Spreads `sample_count` points over the sampled parts in proportion to power: evenly along the sum of powers,
-    /// then inside each triangle by a sequence that fills it evenly [Roberts2018].
+    /// Spreads `sample_count` points over the sampled parts: half of them evenly, so that a small lamp in its shade has
+    /// some, the rest in proportion to power; inside a part evenly along the sum of its triangles' powers, and inside a
+    /// triangle by a sequence that fills it evenly [Roberts2018].
     ///
     /// `positions` in world space at rest and `emission` (W m^-2 sr^-1) per vertex; `is_double_sided` per vertex.
-    ///
-    /// [Roberts2018]: crate::methods::PAPERS
     pub fn new(
         geometry: &Geometry,
         positions: &[Vec3],
@@ -55,60 +54,91 @@ impl EmitterPlan {
         choice: EmitterChoice,
         sample_count: u32,
     ) -> Self {
-        let corners = |t: usize| geometry.triangles[t].map(|v| positions[v as usize]);
         let area = |t: usize| {
-            let [a, b, c] = corners(t);
-            0.5 * (b - a).cross(c - a).length()
+            let [a, b, c] = geometry.triangles[t].map(|v| positions[v as usize]);
+            f64::from(0.5 * (b - a).cross(c - a).length())
         };
-        let brightness =
-            |t: usize| geometry.triangles[t].iter().map(|&v| emission[v as usize].element_sum()).sum::<f32>();
-        let total_area: f32 = (0..geometry.triangles.len()).map(area).sum();
+        let brightness = |t: usize| {
+            f64::from(geometry.triangles[t].iter().map(|&v| emission[v as usize].element_sum()).sum::<f32>())
+        };
+        let total_area: f64 = (0..geometry.triangles.len()).map(area).sum();
 
         let mut plan = Self { is_sampled: vec![false; geometry.parts.len()], ..Self::default() };
-        // (triangle, power up to and with it)
-        let mut powers: Vec<(usize, f64)> = Vec::new();
-        let mut power = 0.0f64;
+        let mut sampled = Vec::new();
         for (index, part) in geometry.parts.iter().enumerate() {
             let triangles = part.triangle_offset as usize..(part.triangle_offset + part.triangle_count) as usize;
-            if !triangles.clone().any(|t| brightness(t) > 0.0) {
+            let powers = PowerSums::new(triangles.clone().map(|t| (t, area(t) * brightness(t))));
+            if powers.total <= 0.0 {
                 continue;
             }
-            let part_area: f32 = triangles.clone().map(area).sum();
-            let sampled = match choice {
-                EmitterChoice::Auto => part_area <= SMALL_PART * total_area,
-                EmitterChoice::Linked => false,
-                EmitterChoice::Sampled => true,
-            };
-            if !sampled {
+            let is_small = triangles.map(area).sum::<f64>() <= SMALL_PART * total_area;
+            if choice == EmitterChoice::Sampled || (choice == EmitterChoice::Auto && is_small) {
+                plan.is_sampled[index] = true;
+                sampled.push(powers);
+            } else {
                 plan.linked_parts += 1;
-                continue;
-            }
-            plan.sampled_parts += 1;
-            plan.is_sampled[index] = true;
-            for t in triangles {
-                let own = f64::from(area(t)) * f64::from(brightness(t));
-                if own > 0.0 {
-                    power += own;
-                    powers.push((t, power));
-                }
             }
         }
-        let count = if powers.is_empty() { 0 } else { sample_count };
-        for k in 0..count {
-            let target = (f64::from(k) + 0.5) / f64::from(count) * power;
-            let at = powers.partition_point(|&(_, sum)| sum <= target).min(powers.len() - 1);
-            let triangle = powers[at].0;
-            // The point stands for the area that would emit its share of all power at this brightness.
-            let stands_for = power / f64::from(count) / f64::from(brightness(triangle));
+        plan.sampled_parts = sampled.len() as u32;
+
+        for (k, (triangle, power)) in spread(&sampled, sample_count).into_iter().enumerate() {
+            // The point stands for the area that would emit its share of the power at this brightness.
+            let stands_for = power / brightness(triangle);
             plan.samples.push(EmitterSample {
                 triangle: triangle as u32,
-                barycentrics: point_in_triangle(k),
-                share: (stands_for / f64::from(area(triangle))) as f32,
+                barycentrics: point_in_triangle(k as u32),
+                share: (stands_for / area(triangle)) as f32,
                 is_double_sided: u32::from(is_double_sided(geometry.triangles[triangle][0])),
             });
         }
         plan
     }
+}
+
+/// The triangles of a part with their running sum of powers.
+struct PowerSums {
+    /// (triangle, power up to and with it), those without power left out.
+    sums: Vec<(usize, f64)>,
+    total: f64,
+}
+
+impl PowerSums {
+    fn new(powers: impl Iterator<Item = (usize, f64)>) -> Self {
+        let mut total = 0.0;
+        let sums = powers.filter(|&(_, power)| power > 0.0).map(|(triangle, power)| {
+            total += power;
+            (triangle, total)
+        });
+        Self { sums: sums.collect(), total }
+    }
+
+    /// The triangle in which the sum reaches `power`.
+    fn triangle_at(&self, power: f64) -> usize {
+        self.sums[self.sums.partition_point(|&(_, sum)| sum <= power).min(self.sums.len() - 1)].0
+    }
+}
+
+/// `count` triangles of all parts and the power that each stands for; together all power there is.
+fn spread(parts: &[PowerSums], count: u32) -> Vec<(usize, f64)> {
+    let total: f64 = parts.iter().map(|part| part.total).sum();
+    let each = (count as usize / 2).checked_div(parts.len()).unwrap_or(0);
+    let by_power = count as usize - each * parts.len();
+    let mut points = Vec::with_capacity(count as usize);
+    let mut before = 0.0;
+    for part in parts {
+        // Even steps along the power of all parts; those that fall into this one.
+        let step = |power: f64| (power / total * by_power as f64 + 0.5).floor();
+        let own = (step(before + part.total) - step(before)) as usize;
+        let count = each + own;
+        // Without a point of its own for every part, each point stands for an equal share of all power.
+        let power = if each > 0 { part.total / count as f64 } else { total / by_power as f64 };
+        points.extend((0..count).map(|k| {
+            let at = (k as f64 + 0.5) / count as f64 * part.total;
+            (part.triangle_at(at), power)
+        }));
+        before += part.total;
+    }
+    points
 }
 
 /// The k-th point of an even sequence over a triangle.
@@ -226,5 +256,40 @@ impl Emitters {
             },
         };
         recorder.dispatch(&pass, elements.count);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part(first: usize, powers: &[f64]) -> PowerSums {
+        PowerSums::new(powers.iter().enumerate().map(|(k, &power)| (first + k, power)))
+    }
+
+    #[test]
+    fn points_stand_for_all_power_and_leave_no_part_out() {
+        let parts = [part(0, &[100.0, 0.0, 300.0]), part(3, &[1.0]), part(4, &[7.0, 2.0])];
+        for count in [6, 7, 32, 1000] {
+            let points = spread(&parts, count);
+            assert_eq!(points.len(), count as usize);
+            for (part, range) in parts.iter().zip([0..3, 3..4, 4..6]) {
+                let power: f64 = points.iter().filter(|(t, _)| range.contains(t)).map(|(_, power)| power).sum();
+                assert!((power - part.total).abs() < 1e-9, "{count} points: {power} of {}", part.total);
+            }
+            assert!(points.iter().all(|&(t, _)| t != 1), "a dark triangle has no point");
+        }
+        // Fewer points than parts: all power still, by the brightest.
+        let few = spread(&parts, 2);
+        assert_eq!(few.iter().map(|(_, power)| power).sum::<f64>(), 410.0);
+        assert!(spread(&[], 32).is_empty());
+    }
+
+    #[test]
+    fn points_lie_inside_and_spread() {
+        let points: Vec<Vec2> = (0..64).map(point_in_triangle).collect();
+        assert!(points.iter().all(|p| p.min_element() >= 0.0 && p.x + p.y <= 1.0));
+        let mean = points.iter().sum::<Vec2>() / 64.0;
+        assert!((mean - Vec2::splat(1.0 / 3.0)).abs().max_element() < 0.03, "{mean}");
     }
 }

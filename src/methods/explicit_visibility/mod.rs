@@ -67,7 +67,7 @@ crate::settings! {
         /// How light of emissive surfaces reaches the elements directly.
         emitters: EmitterChoice = EmitterChoice::Auto, paper "area lights only mentioned";
         /// Points on sampled emitters, together; each element casts a shadow ray to every one.
-        emitter_samples: u32 = 32, range 1..=1024, unit "points", paper "not given";
+        emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
         /// Store links in 4 bytes instead of 8: faster; weights off by 1/4096, radiosity by 1/512 at most.
         packed_links: bool = false, paper "off";
         /// How far rays start off their surface, as a share of the scene's extent.
