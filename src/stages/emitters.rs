@@ -228,7 +228,10 @@ impl Emitters {
                 row_count: batch_count,
                 row_length: sample_count,
             };
-            recorder.dispatch(&passes::PackVisibility { is_free, visible: &self.visible, params }, batch_count * words);
+            recorder.dispatch(
+                &passes::PackVisibility { rays, is_free, visible: &self.visible, params },
+                batch_count * words,
+            );
         }
         u64::from(elements.count) * u64::from(sample_count)
     }

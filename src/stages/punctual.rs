@@ -57,6 +57,7 @@ pub fn trace_visibility(
             recorder.dispatch(
                 &passes::PunctualVisibility {
                     shadow_offsets: &elements.shadow_offsets,
+                    rays,
                     is_free,
                     visibility,
                     params: passes::PunctualVisibilityParams {

@@ -202,3 +202,11 @@ fn a_moved_block_and_lamp_are_lit_as_from_a_fresh_start() {
         ],
     );
 }
+
+/// Skin and clip: every element moves.
+#[test]
+fn the_dancer_is_lit_alike_by_refit_and_from_a_fresh_start() {
+    let context = TestContext::new();
+    let at = |seconds: f32| move |scene: &Scene| Pose::at(scene, seconds);
+    assert_followed(&context, || builtin_scene("dancer"), &[&at(0.3), &at(0.9), &at(2.0)]);
+}

@@ -76,6 +76,7 @@ fn punctual_passes_agree_with_their_twins() {
             let is_free: Vec<u32> = (0..ray_count).map(|_| random.below(2)).collect();
             let visibility_pass = passes::PunctualVisibility {
                 shadow_offsets: &shadow_offsets,
+                rays: &rays,
                 is_free: &context.upload("test/free", &is_free).unwrap(),
                 visibility: &visibility,
                 params: passes::PunctualVisibilityParams {
@@ -100,7 +101,7 @@ fn punctual_passes_agree_with_their_twins() {
             };
             let twin = twins::light::punctual_rays(&shadow_mesh, light, 0, count, 0.01);
             assert_same_rays("punctual_rays", &context.download(&rays).unwrap(), &twin);
-            all_visibility.extend(twins::light::punctual_visibility(&mesh.shadow_offsets, &is_free));
+            all_visibility.extend(twins::light::punctual_visibility(&mesh.shadow_offsets, &twin, &is_free));
         }
         assert_eq!(context.download(&visibility).unwrap(), all_visibility);
     }
@@ -150,6 +151,7 @@ fn emitter_passes_agree_with_their_twins() {
         };
         recorder.dispatch(&pass, rays.len());
         let pass = passes::PackVisibility {
+            rays: &rays,
             is_free: &context.upload("test/free", &is_free).unwrap(),
             visible: &visible,
             params: passes::PackVisibilityParams { first_word: 0, row_count: count, row_length: sample_count },
@@ -172,7 +174,7 @@ fn emitter_passes_agree_with_their_twins() {
         let (at, t) = (&mesh.positions, &mesh.triangles);
         let twin = twins::light::emitter_rays(&normals, &origins, &samples, t, at, 0, count, 0.01);
         assert_same_rays("emitter_rays", &context.download(&rays).unwrap(), &twin);
-        let bits = twins::light::pack_visibility(&is_free, sample_count as usize);
+        let bits = twins::light::pack_visibility(&twin, &is_free, sample_count as usize);
         assert_eq!(context.download(&visible).unwrap(), bits);
         let twin = twins::light::emitter_irradiance(&positions, &normals, &samples, t, at, &emission, &bits);
         assert_close("emitter_irradiance", &context.download(&irradiance).unwrap(), &twin, 1e-5, 1e-4);

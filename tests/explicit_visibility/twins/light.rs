@@ -64,10 +64,11 @@ pub fn punctual_rays(mesh: &ShadowMesh<'_>, light: &Light, first: u32, count: u3
     rays
 }
 
-pub fn punctual_visibility(shadow_offsets: &[u32], is_free: &[u32]) -> Vec<f32> {
+pub fn punctual_visibility(shadow_offsets: &[u32], rays: &[Ray], is_free: &[u32]) -> Vec<f32> {
     let mean = |row: &[u32]| {
-        let rays = &is_free[row[0] as usize..row[1] as usize];
-        rays.iter().sum::<u32>() as f32 / rays.len() as f32
+        let cast: Vec<u32> =
+            (row[0] as usize..row[1] as usize).filter(|&ray| rays[ray].t_max >= 0.0).map(|ray| is_free[ray]).collect();
+        if cast.is_empty() { 0.0 } else { cast.iter().sum::<u32>() as f32 / cast.len() as f32 }
     };
     shadow_offsets.windows(2).map(mean).collect()
 }
@@ -118,9 +119,10 @@ pub fn emitter_rays(
     rays
 }
 
-pub fn pack_visibility(is_free: &[u32], row_length: usize) -> Vec<u32> {
+pub fn pack_visibility(rays: &[Ray], is_free: &[u32], row_length: usize) -> Vec<u32> {
+    let answers: Vec<u32> = rays.iter().zip(is_free).map(|(r, free)| if r.t_max >= 0.0 { *free } else { 0 }).collect();
     let word = |bits: &[u32]| bits.iter().enumerate().fold(0, |word, (k, bit)| word | bit << k);
-    is_free.chunks(row_length).flat_map(|row| row.chunks(32).map(word)).collect()
+    answers.chunks(row_length).flat_map(|row| row.chunks(32).map(word)).collect()
 }
 
 pub fn emitter_irradiance(
