@@ -46,6 +46,8 @@ impl EmitterPlan {
     /// triangle by a sequence that fills it evenly [Roberts2018].
     ///
     /// `positions` in world space at rest and `emission` (W m^-2 sr^-1) per vertex; `is_double_sided` per vertex.
+    ///
+    /// [Roberts2018]: crate::methods::PAPERS
     pub fn new(
         geometry: &Geometry,
         positions: &[Vec3],
