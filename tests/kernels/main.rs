@@ -10,4 +10,5 @@ mod display;
 mod environment_irradiance;
 mod g_buffer;
 mod materials;
+mod pair_queue;
 mod punctual_irradiance;
