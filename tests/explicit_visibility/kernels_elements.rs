@@ -129,11 +129,12 @@ fn passes_over_neighbours_agree_with_their_twins() {
         let ring_values = context.upload("test/ring", &ring.values).unwrap();
         let device = context.upload("test/irradiance", &irradiance).unwrap();
         let smoothed = context.buffer::<Vec3>("test/smoothed", count as usize).unwrap();
+        let element_normals = context.upload("test/normals", &normals).unwrap();
         let mut recorder = context.recorder("test").unwrap();
         let pass = passes::Smooth {
             ring_offsets: &ring_offsets,
             ring: &ring_values,
-            element_normals: &context.upload("test/normals", &normals).unwrap(),
+            element_normals: &element_normals,
             irradiance: &device,
             smoothed: &smoothed,
             params: passes::SmoothParams { element_count: count, cos_feature_angle: 0.3 },
@@ -143,6 +144,7 @@ fn passes_over_neighbours_agree_with_their_twins() {
             outcomes: &context.upload("test/outcomes", &outcomes).unwrap(),
             ring_offsets: &ring_offsets,
             ring: &ring_values,
+            element_normals: &element_normals,
             irradiance: &device,
             params: passes::FillUnresolvedParams { element_count: count, ray_count: 256 },
         };
@@ -151,7 +153,7 @@ fn passes_over_neighbours_agree_with_their_twins() {
         let twin = twins::elements::smooth(&ring, &normals, &irradiance, 0.3);
         assert_close("smooth", &context.download(&smoothed).unwrap(), &twin, 1e-6, 1e-5);
         let mut filled = irradiance.clone();
-        twins::elements::fill_unresolved(&outcomes, &ring, &mut filled, 256);
+        twins::elements::fill_unresolved(&outcomes, &ring, &normals, &mut filled, 256);
         assert_close("fill_unresolved", &context.download(&device).unwrap(), &filled, 1e-6, 1e-5);
         assert!(count < 60 || filled != irradiance, "some elements are unresolved");
     }

@@ -271,6 +271,7 @@ impl ExplicitVisibility {
             outcomes: &self.outcomes.counts,
             ring_offsets: &self.elements.ring_offsets,
             ring: &self.elements.ring,
+            element_normals: &self.elements.normals,
             irradiance,
             params: FillUnresolvedParams {
                 element_count: self.elements.count,

@@ -91,15 +91,16 @@ pub fn rays(origins: &[Vec3], normals: &[Vec3], first: u32, count: u32, side: u3
     rays
 }
 
-pub fn fill_unresolved(outcomes: &[u32], ring: &Rows, irradiance: &mut [Vec3], ray_count: u32) {
+pub fn fill_unresolved(outcomes: &[u32], ring: &Rows, normals: &[Vec3], irradiance: &mut [Vec3], ray_count: u32) {
     let before = irradiance.to_vec();
     let is_unresolved = |element: u32| (outcomes[element as usize] & 0xffff) * 2 > ray_count;
     for element in 0..irradiance.len() as u32 {
         if !is_unresolved(element) {
             continue;
         }
-        let resolved: Vec<Vec3> =
-            ring.row(element).iter().filter(|&&e| !is_unresolved(e)).map(|&e| before[e as usize]).collect();
+        let looks_same_way = |&&e: &&u32| normals[e as usize].dot(normals[element as usize]) > 0.5;
+        let resolved = ring.row(element).iter().filter(|&&e| !is_unresolved(e)).filter(looks_same_way);
+        let resolved: Vec<Vec3> = resolved.map(|&e| before[e as usize]).collect();
         if !resolved.is_empty() {
             irradiance[element as usize] = resolved.iter().sum::<Vec3>() / resolved.len() as f32;
         }

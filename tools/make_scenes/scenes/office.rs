@@ -46,10 +46,11 @@ fn shell(document: &mut Document) {
     let left = upright(LEFT, FRONT, Vec3::NEG_Z);
     let others = upright(RIGHT, BACK, Vec3::Z).wall(side, &[]).with(upright(RIGHT, FRONT, Vec3::NEG_X).wall(end, &[]));
     document.add("walls", plaster, others.with(left.wall(side, &[WINDOW])).with(left.reveal(&WINDOW, WALL, true)));
+    // Against the walls, not into them: what lies beyond a wall stands in the sun.
     let skirting = [
-        block([LEFT, RIGHT], [0.0, 0.09], [BACK - 0.02, BACK + 0.016]),
-        block([LEFT - 0.02, LEFT + 0.016], [0.0, 0.09], [BACK, FRONT]),
-        block([RIGHT - 0.016, RIGHT + 0.02], [0.0, 0.09], [BACK, FRONT]),
+        block([LEFT, RIGHT], [0.0, 0.09], [BACK, BACK + 0.016]),
+        block([LEFT, LEFT + 0.016], [0.0, 0.09], [BACK, FRONT]),
+        block([RIGHT - 0.016, RIGHT], [0.0, 0.09], [BACK, FRONT]),
     ];
     document.add("skirting", paint, Shape::union(skirting));
 }
