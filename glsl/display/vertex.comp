@@ -55,9 +55,9 @@ vec3 shadow_ndc(ShadowView view, vec3 point)
 
 // Share of the light that reaches `point`: 3 texels a side around it, smoothed. Each texel is compared with the depth
 // of the surface's own plane there (projections keep planes plane), so no surface shadows itself, and nothing has to
-// be moved towards the light, which would leak through walls without thickness. A texel where the light sees well past
-// the plane tells nothing of this surface, which ends before it: it counts as blocked where others are, or sunlight
-// outside would shine in along the edges of a room.
+// be moved towards the light, which would leak through walls without thickness. A texel is free where the light sees
+// this very surface. Where it sees past the plane, the surface has ended: that counts as blocked where others are, or
+// sunlight outside would shine in along the edges of a room.
 float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 shading_normal, vec3 to_light, float distance_to_light)
 {
     ShadowLight views = shadow_lights[light];
@@ -83,8 +83,8 @@ float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 shading_normal
     // Next to a triangle of a smooth mesh others rise above its plane, by about twice what the normals differ, two
     // texels away; a flat surface needs no more than the last digits of a depth.
     float rise = 8.0 * distance(surface_normal, shading_normal) / max(dot(surface_normal, to_light), 0.1);
-    float tolerance = (0.01 + rise) * step_depth;
     slope = clamp(slope * texel_ndc, vec2(-30.0 * step_depth), vec2(30.0 * step_depth));
+    float tolerance = (0.01 + rise) * step_depth + 0.002 * (abs(slope.x) + abs(slope.y));
 
     vec2 place = (at.xy * 0.5 + 0.5) * vec2(size) - 0.5;
     ivec2 first = ivec2(floor(place)) - 1;
@@ -97,7 +97,7 @@ float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 shading_normal
             ivec2 texel_at = clamp(first + ivec2(x, y), ivec2(0), size - 1);
             float plane = at.z + dot(slope, vec2(first + ivec2(x, y)) - place);
             float nearest = texelFetch(shadow_maps, ivec3(texel_at, layer), 0).x;
-            if (plane - nearest > 4.0 * step_depth + tolerance) beyond += weight;
+            if (plane - nearest > tolerance) beyond += weight;
             else if (plane + tolerance >= nearest) free += weight;
             else blocked += weight;
         }
