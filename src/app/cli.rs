@@ -111,7 +111,8 @@ pub struct RenderArgs {
     /// Only light that was reflected at least once before
     #[arg(long)]
     pub indirect_only: bool,
-    /// Tessellate to about this many elements [default: 20000; path-tracing: as the scene is]
+    /// Tessellate to about this many elements [default: 20000 or more, no edge above 1/40
+    /// of the scene's diagonal; path-tracing: as the scene is]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=50_000_000))]
     pub elements: Option<u32>,
     /// Exposure in stops, for .png

@@ -24,6 +24,8 @@ use crate::stages::world::World;
 const MAX_MEMORY_BYTES: u64 = 8 << 30;
 /// Elements that methods solving on elements aim at where nothing else is asked for.
 const DEFAULT_ELEMENTS: u32 = 20_000;
+/// Of those, at most as long, as a share of the scene's diagonal: half a step of a stair in a house.
+const DEFAULT_LONGEST_EDGE: f32 = 1.0 / 40.0;
 
 /// Everything a frame starts from.
 pub struct Stage {
@@ -141,15 +143,20 @@ fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
 }
 
 /// The scene as one list of triangles, cut as fine as the request asks, and its vertices' places at rest. A method
-/// with elements needs some by default.
+/// with elements needs some by default, also on the large surfaces of a scene that has many small ones.
 fn flatten(scene: &Scene, request: &RenderRequest) -> Result<(Geometry, Vec<Vec3>), AppError> {
     let geometry = Geometry::flatten(scene, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
     let rest = Pose::rest(scene);
-    let default = request.display.is_some().then_some(DEFAULT_ELEMENTS);
-    let Some(target) = request.elements.or(default) else {
-        let positions = deform::world_positions(&geometry, &rest);
-        return Ok((geometry, positions));
+    let fineness = match request.elements {
+        Some(target) => Fineness::Elements(target),
+        None if request.display.is_some() => {
+            Fineness::Balanced { elements: DEFAULT_ELEMENTS, longest_edge: DEFAULT_LONGEST_EDGE }
+        }
+        None => {
+            let positions = deform::world_positions(&geometry, &rest);
+            return Ok((geometry, positions));
+        }
     };
-    let cut = tessellate(geometry, &rest, Fineness::Elements(target), MAX_MEMORY_BYTES).map_err(AppError::failed)?;
+    let cut = tessellate(geometry, &rest, fineness, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
     Ok((cut.geometry, cut.rest_positions))
 }

@@ -279,6 +279,32 @@ fn counts_come_near_the_target_and_never_below_the_input() {
 }
 
 #[test]
+fn large_surfaces_are_cut_where_small_things_already_make_up_the_number() {
+    // 961 vertices on a square metre, beside a floor of 4 and 20 m a side.
+    let floor = |side: f32| {
+        let [x, z] = [Vec3::X * side, Vec3::Z * side];
+        primitive(vec![Vec3::ZERO, x, x + z, z], vec![[0, 2, 1], [0, 3, 2]])
+    };
+    for side in [4.0, 20.0] {
+        let mut scene = scene_of(sheet(30, 30));
+        scene.meshes[0].primitives.push(floor(side));
+        let before = Geometry::flatten(&scene, BUDGET).unwrap().vertex_count();
+        let [few, many] = [500, 3000].map(|elements| cut(&scene, Fineness::Balanced { elements, longest_edge: 0.05 }));
+        let diagonal = (2.0 * f64::from(side).powi(2) + 1.0).sqrt();
+        let edge = longest_edge(&few.geometry.triangles, &few.rest_positions);
+        assert!(edge <= 0.05001 * diagonal && edge > 0.02 * diagonal, "floor of {side} m cut to {edge} m");
+        let count = few.geometry.vertex_count();
+        assert!(count > before + 200 && count < 4 * before, "{before} vertices, {count} after");
+        let ratio = f64::from(many.geometry.vertex_count()) / 3000.0;
+        assert!((0.8..1.25).contains(&ratio), "{ratio} of the number asked for");
+        // Slivers all over would take too many: it stops at about four times as many.
+        let fine = cut(&scene, Fineness::Balanced { elements: 500, longest_edge: 1e-4 });
+        let growth = f64::from(fine.geometry.vertex_count()) / f64::from(before);
+        assert!((2.5..6.0).contains(&growth), "grew {growth} times");
+    }
+}
+
+#[test]
 fn triangles_stay_well_shaped() {
     // A right isosceles triangle has shape 0.866, its half by the height too.
     for target in [300, 1000, 4000, 20_000] {
@@ -315,6 +341,8 @@ fn what_does_not_fit_is_refused_quickly() {
     assert!(matches!(error, TessellationError::Geometry(GeometryError::TooMany { .. })), "{error}");
     for length in [0.0, -1.0, f32::NAN] {
         assert!(matches!(refuse(Fineness::MaxEdge(length), BUDGET), TessellationError::EdgeLength(_)));
+        let balanced = Fineness::Balanced { elements: 9, longest_edge: length };
+        assert!(matches!(refuse(balanced, BUDGET), TessellationError::EdgeLength(_)));
     }
     let empty = Scene::default();
     let geometry = Geometry::flatten(&empty, BUDGET).unwrap();

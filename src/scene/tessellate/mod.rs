@@ -30,6 +30,10 @@ pub enum Fineness {
     /// About this many elements (vertices), never fewer than there are. Within 20 % where edge lengths vary; counts
     /// jump by up to twice where very many edges have the same length (a fine regular grid).
     Elements(u32),
+    /// As [`Fineness::Elements`], but no edge longer than a share of the scene's diagonal, as long as that takes no more
+    /// than about four times as many elements (as asked, or as there are): a scene of many small things has large
+    /// floors too.
+    Balanced { elements: u32, longest_edge: f32 },
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -70,6 +74,14 @@ pub fn tessellate(
         Fineness::MaxEdge(length) if length > 0.0 => f64::from(length),
         Fineness::MaxEdge(length) => return Err(TessellationError::EdgeLength(length)),
         Fineness::Elements(target) => mesh.edge_length_for(target)?,
+        Fineness::Balanced { longest_edge, .. } if !(longest_edge > 0.0) => {
+            return Err(TessellationError::EdgeLength(longest_edge));
+        }
+        Fineness::Balanced { elements, longest_edge } => {
+            let vertices = mesh.geometry.vertex_count();
+            let bound = mesh.bounded_edge_length(f64::from(longest_edge), 4.0 * f64::from(elements.max(vertices)));
+            if vertices >= elements { bound } else { mesh.edge_length_for(elements)?.min(bound) }
+        }
     };
     mesh.check(mesh.least_counts(max_edge))?;
     let counts = mesh.counts(max_edge);
@@ -99,6 +111,13 @@ struct Mesh {
 impl Mesh {
     fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.geometry.triangles[triangle].map(|vertex| self.positions[vertex as usize].as_dvec3())
+    }
+
+    /// Of the box around all vertices, metres.
+    fn diagonal(&self) -> f64 {
+        let start = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        let [low, high] = self.positions.iter().fold(start, |[low, high], &p| [low.min(p), high.max(p)]);
+        if self.positions.is_empty() { 0.0 } else { high.as_dvec3().distance(low.as_dvec3()) }
     }
 
     fn side_segments(&self, triangle: usize, max_edge: f64) -> [u32; 3] {
@@ -205,6 +224,16 @@ impl Mesh {
             wanted *= (target as f64 / count as f64).powf(0.7);
         }
         Ok(best.0)
+    }
+
+    /// `share` of the diagonal, or the length at which about `most` vertices are made where that is longer.
+    fn bounded_edge_length(&self, share: f64, most: f64) -> f64 {
+        let length = (share * self.diagonal()).max(f64::MIN_POSITIVE);
+        if (self.estimate(length, TYPICAL_DENSITY)[0] as f64) <= most {
+            return length;
+        }
+        let longest = self.edges.lengths.iter().copied().fold(0.0, f64::max);
+        self.invert_estimate(most, longest)
     }
 
     /// The edge length at which the estimate gives `wanted` vertices, by bisection.

@@ -98,9 +98,13 @@ pub fn fill_unresolved(outcomes: &[u32], ring: &Rows, normals: &[Vec3], irradian
         if !is_unresolved(element) {
             continue;
         }
-        let looks_same_way = |&&e: &&u32| normals[e as usize].dot(normals[element as usize]) > 0.5;
-        let resolved = ring.row(element).iter().filter(|&&e| !is_unresolved(e)).filter(looks_same_way);
-        let resolved: Vec<Vec3> = resolved.map(|&e| before[e as usize]).collect();
+        let cosine = |e: u32| normals[e as usize].dot(normals[element as usize]);
+        let resolved = |range: std::ops::Range<f32>| {
+            let chosen = ring.row(element).iter().filter(|&&e| !is_unresolved(e) && range.contains(&cosine(e)));
+            chosen.map(|&e| before[e as usize]).collect::<Vec<Vec3>>()
+        };
+        let same_way = resolved(0.5f32.next_up()..2.0);
+        let resolved = if same_way.is_empty() { resolved((-0.5f32).next_up()..2.0) } else { same_way };
         if !resolved.is_empty() {
             irradiance[element as usize] = resolved.iter().sum::<Vec3>() / resolved.len() as f32;
         }
