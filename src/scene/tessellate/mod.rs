@@ -74,14 +74,12 @@ pub fn tessellate(
         Fineness::MaxEdge(length) if length > 0.0 => f64::from(length),
         Fineness::MaxEdge(length) => return Err(TessellationError::EdgeLength(length)),
         Fineness::Elements(target) => mesh.edge_length_for(target)?,
-        Fineness::Balanced { longest_edge, .. } if !(longest_edge > 0.0) => {
-            return Err(TessellationError::EdgeLength(longest_edge));
-        }
-        Fineness::Balanced { elements, longest_edge } => {
+        Fineness::Balanced { elements, longest_edge } if longest_edge > 0.0 => {
             let vertices = mesh.geometry.vertex_count();
             let bound = mesh.bounded_edge_length(f64::from(longest_edge), 4.0 * f64::from(elements.max(vertices)));
             if vertices >= elements { bound } else { mesh.edge_length_for(elements)?.min(bound) }
         }
+        Fineness::Balanced { longest_edge, .. } => return Err(TessellationError::EdgeLength(longest_edge)),
     };
     mesh.check(mesh.least_counts(max_edge))?;
     let counts = mesh.counts(max_edge);
