@@ -12,6 +12,7 @@ pub mod alias;
 pub mod animation;
 pub mod builtin;
 pub mod camera;
+pub mod charts;
 pub mod deform;
 pub mod environment;
 pub mod geometry;
