@@ -54,6 +54,7 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
         direct_irradiance: &direct_irradiance,
         indirect_irradiance: &indirect_irradiance,
         back_elements: &back_elements,
+        colors: None,
     };
     let mut recorder = context.recorder("frame").unwrap();
     shadow_maps.draw(&mut recorder, &world, &pose, bounds);

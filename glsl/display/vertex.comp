@@ -43,6 +43,7 @@ layout(push_constant, scalar) uniform Params {
     uint light_count;
     float weight;
     uint is_first;
+    uint shows_colors;  // direct_irradiance holds colours, shown unlit: each pixel that of the vertex it is nearest to
 } params;
 
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
@@ -139,7 +140,14 @@ void main()
     Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, emitted.rgb, n.xyz, emitted.w > 0.5);
 
     vec3 direct_sum = s.emission, indirect_sum = vec3(0.0);
-    if (s.reflects) {
+    if (params.shows_colors != 0) {
+        uvec3 v = triangles[seen - 1];
+        vec3 across = cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]);
+        vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
+        uint nearest = w.x >= max(w.y, w.z) ? v.x : w.y >= w.z ? v.y : v.z;
+        bool is_back = dot(across, to_eye) < 0.0 && back_elements[nearest] != NO_ELEMENT;
+        direct_sum = direct_irradiance[is_back ? back_elements[nearest] : nearest];
+    } else if (s.reflects) {
         uvec3 v = triangles[seen - 1];
         vec3 geometric = normalize(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]));
         uvec3 elements = v;

@@ -4,11 +4,13 @@
 //! |---|---|
 //! | [`shadow_maps`] | reversed depth of every view of every punctual light |
 //! | [`g_buffer`] | which triangle each pixel sees, and the surface there |
+//! | [`false_color`] | debug views: palettes, and the element under a pixel |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
 //!
 //! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
 //! comes after, in [`crate::report::tonemap`].
 
+pub mod false_color;
 pub mod g_buffer;
 pub mod shadow_maps;
 pub mod vertex;

@@ -19,6 +19,8 @@ pub struct VertexLight<'a> {
     pub indirect_irradiance: &'a Buffer<Vec3>,
     /// Per vertex: the entry of the two above that its back shows; u32::MAX shows the front's.
     pub back_elements: &'a Buffer<u32>,
+    /// False colours per element: shown instead of all light, unlit.
+    pub colors: Option<&'a Buffer<Vec3>>,
 }
 
 /// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
@@ -47,7 +49,7 @@ pub fn draw(
                 g_emission: g_buffer.sampled(&g_buffer.emission),
                 triangles: &world.triangles,
                 positions: &world.positions,
-                direct_irradiance: light.direct_irradiance,
+                direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
                 indirect_irradiance: light.indirect_irradiance,
                 back_elements: light.back_elements,
                 lights: &world.lights,
@@ -69,6 +71,7 @@ pub fn draw(
                     light_count: world.light_count,
                     weight: 1.0 / samples as f32,
                     is_first: u32::from(sample == 0),
+                    shows_colors: u32::from(light.colors.is_some()),
                 },
             };
             recorder.dispatch(&pass, [film.width, film.height]);

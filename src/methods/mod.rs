@@ -6,6 +6,7 @@
 pub mod explicit_visibility;
 mod papers;
 pub mod path_tracing;
+pub mod pick;
 pub mod settings;
 
 use serde_json::{Map, Value};
@@ -88,7 +89,7 @@ mod tests {
         for method in METHODS {
             for spec in method.specs() {
                 let text = match (&spec.default, &spec.kind) {
-                    (Value::String(name), Kind::Choice { .. }) => name.clone(),
+                    (Value::String(name), Kind::Choice { .. } | Kind::Text { .. }) => name.clone(),
                     (value, _) => value.to_string(),
                 };
                 let assignment = Assignment { key: spec.name.to_owned(), value: text };

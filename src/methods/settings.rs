@@ -57,6 +57,7 @@ pub enum Kind {
     Int { min: u32, max: u32 },
     Float { min: f32, max: f32 },
     Choice { values: Vec<ChoiceValue> },
+    Text { form: &'static str },
 }
 
 /// One value of a choice.
@@ -72,6 +73,7 @@ impl fmt::Display for Kind {
             Self::Bool => f.write_str("true or false"),
             Self::Int { min, max } => write!(f, "a whole number from {min} to {max}"),
             Self::Float { min, max } => write!(f, "a number from {min} to {max}"),
+            Self::Text { form } => f.write_str(form),
             Self::Choice { values } => {
                 let names: Vec<&str> = values.iter().map(|value| value.name).collect();
                 write!(f, "one of {}", names.join(", "))

@@ -218,7 +218,7 @@ impl Case {
         let count = geometry.vertex_count();
         let backs: Vec<u32> = (count..2 * count).collect();
         let back_elements = &context.upload("test/back elements", &backs).unwrap();
-        let light = VertexLight { direct_irradiance, indirect_irradiance, back_elements };
+        let light = VertexLight { direct_irradiance, indirect_irradiance, back_elements, colors: None };
         let mut recorder = context.recorder("test").unwrap();
         shadow_maps.draw(&mut recorder, &world, pose, bounds);
         vertex::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, view, samples, &film);
