@@ -322,3 +322,42 @@ fn log_settings_that_are_not_understood_are_said_and_ignored() {
     run.succeeds();
     assert!(run.err.contains("RUST_LOG"), "{}", run.err);
 }
+
+/// Ctrl-C ends long work between two steps: exit code 1, and the old picture stays as it was.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_the_work_and_leaves_files_alone() {
+    use std::io::{BufRead as _, BufReader, Read as _};
+
+    let long_work: [(&str, &[&str]); 2] = [
+        ("samples of path tracing", &["--method", "path-tracing", "--spp", "65536", "--size", "96x96"]),
+        ("link generation", &["--elements", "60000", "--set", "rays_per_element=1024", "--size", "16x16"]),
+    ];
+    for (work, arguments) in long_work {
+        let folder = Pictures::new();
+        std::fs::write(folder.path("out.exr"), b"as before").unwrap();
+        let mut child = program()
+            .args(["render", "builtin:cornell-box", "-v", "-o", &folder.text("out.exr")])
+            .args(arguments)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut log = BufReader::new(child.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains(" elements, ") {
+            line.clear();
+            assert!(log.read_line(&mut line).unwrap() > 0, "{work}: ended before it began");
+        }
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        let mut rest = String::new();
+        log.read_to_string(&mut rest).unwrap();
+        let status = child.wait().unwrap();
+        assert_eq!(status.code(), Some(1), "{work}: {rest}");
+        assert!(rest.contains("error: interrupted; nothing was written"), "{work}: {rest}");
+        let files: Vec<_> = std::fs::read_dir(folder.0.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        assert_eq!(files, ["out.exr"], "{work}");
+        assert_eq!(std::fs::read(folder.path("out.exr")).unwrap(), b"as before", "{work}");
+    }
+}

@@ -1,10 +1,14 @@
 //! What goes to standard error: log lines and progress bars that do not overwrite each other.
 
+use std::cell::RefCell;
 use std::io::{self, IsTerminal as _, Write};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
+
+use super::interrupt::Interrupt;
+use crate::stages::work::{Interrupted, Watch};
 
 /// How much is said.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,7 +72,7 @@ impl Console {
     }
 
     /// A bar over `length` steps; silent where standard error is no terminal. Dropping it removes it.
-    pub fn progress(&self, task: &str, length: u64) -> Progress {
+    fn progress(&self, task: &str, length: u64) -> Progress {
         if !self.visible {
             return Progress(ProgressBar::hidden());
         }
@@ -81,12 +85,35 @@ impl Console {
 
 /// A running progress bar.
 #[derive(Debug)]
-pub struct Progress(ProgressBar);
+struct Progress(ProgressBar);
 
-impl Progress {
-    /// `count` more steps are done.
-    pub fn advance(&self, count: u64) {
-        self.0.inc(count);
+/// Shows a bar for whatever long work is done at the time, and ends it where the user asks.
+pub struct Watcher<'a> {
+    console: &'a Console,
+    interrupt: &'a Interrupt,
+    bar: RefCell<Option<(String, Progress)>>,
+}
+
+impl<'a> Watcher<'a> {
+    pub fn new(console: &'a Console, interrupt: &'a Interrupt) -> Self {
+        Self { console, interrupt, bar: RefCell::new(None) }
+    }
+}
+
+impl Watch for Watcher<'_> {
+    fn step(&self, task: &str, done: u64, total: u64) -> Result<(), Interrupted> {
+        let mut bar = self.bar.borrow_mut();
+        if done >= total {
+            *bar = None;
+        } else {
+            if bar.as_ref().is_none_or(|(name, _)| name != task) {
+                *bar = Some((task.to_owned(), self.console.progress(task, total)));
+            }
+            if let Some((_, bar)) = &*bar {
+                bar.0.set_position(done);
+            }
+        }
+        self.interrupt.check()
     }
 }
 

@@ -3,13 +3,13 @@
 use std::error::Error;
 use std::io;
 
-use super::interrupt::Interrupted;
 use crate::gpu::{CaptureError, GpuError};
 use crate::methods::settings::SettingError;
 use crate::report::errors::CompareError;
 use crate::report::image::PictureError;
 use crate::report::profile::ProfileError;
 use crate::report::write::FileError;
+use crate::stages::work::Interrupted;
 
 /// Why a command failed. Messages say what failed, the value seen, what was allowed and what to do next.
 #[derive(Debug, thiserror::Error)]

@@ -2,8 +2,6 @@
 
 use super::AppError;
 use super::cli::Channel;
-use super::console::Progress;
-use super::interrupt::Interrupt;
 use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
 use crate::display::g_buffer::GBuffer;
@@ -14,6 +12,7 @@ use crate::methods::explicit_visibility::{self, ExplicitVisibility};
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
 use crate::stages::film::Film;
+use crate::stages::work::Watch;
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {
@@ -29,7 +28,7 @@ pub struct VertexShown {
 }
 
 /// What a method sees of a staged scene.
-fn explicit_stage(stage: &Stage) -> explicit_visibility::Stage<'_> {
+fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibility::Stage<'a> {
     explicit_visibility::Stage {
         scene: &stage.scene,
         geometry: &stage.geometry,
@@ -37,12 +36,18 @@ fn explicit_stage(stage: &Stage) -> explicit_visibility::Stage<'_> {
         environment: &stage.environment,
         world: &stage.world,
         tracer: stage.tracer(),
+        watch,
     }
 }
 
 impl Method {
     /// Everything a method does once per scene and pose.
-    pub fn prepare(context: &Context, request: &RenderRequest, stage: &Stage) -> Result<Self, AppError> {
+    pub fn prepare(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        watch: &dyn Watch,
+    ) -> Result<Self, AppError> {
         match request.method.key {
             "path-tracing" => {
                 let options = Options {
@@ -58,7 +63,7 @@ impl Method {
             }
             "explicit-visibility" => {
                 let settings = request.settings()?;
-                let method = ExplicitVisibility::prepare(context, &explicit_stage(stage), settings);
+                let method = ExplicitVisibility::prepare(context, &explicit_stage(stage, watch), settings);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
@@ -76,8 +81,7 @@ impl Method {
         request: &RenderRequest,
         stage: &Stage,
         film: &Film,
-        progress: &Progress,
-        interrupt: &Interrupt,
+        watch: &dyn Watch,
     ) -> Result<(), AppError> {
         let Stage { world, view, pose, bounds, .. } = stage;
         match self {
@@ -85,15 +89,15 @@ impl Method {
                 method.prepare(context, world)?;
                 // Each submission is one batch of samples, so that the user can interrupt between them.
                 while method.sample_count() < request.spp {
-                    interrupt.check()?;
+                    watch.step(request.method.key, method.sample_count().into(), request.spp.into())?;
                     let samples = method.samples_at_once().min(request.spp - method.sample_count());
                     let mut recorder = context.recorder("frame")?;
                     recorder.scope("path-tracing", |recorder| {
                         method.sample(recorder, world, &stage.tracer(), view, samples);
                     });
                     recorder.submit()?;
-                    progress.advance(u64::from(samples));
                 }
+                watch.step(request.method.key, request.spp.into(), request.spp.into())?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("path-tracing", |recorder| method.resolve(recorder, film));
                 recorder.submit()?;
@@ -121,7 +125,6 @@ impl Method {
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });
                 recorder.submit()?;
-                progress.advance(u64::from(request.spp));
                 Ok(())
             }
         }

@@ -1,5 +1,6 @@
 //! Ctrl-C (and SIGTERM) as a flag that long work polls, so that it ends between two steps with nothing half-written.
 
+use crate::stages::work::Interrupted;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -11,11 +12,6 @@ const EXIT_AT_ONCE: i32 = 130;
 pub struct Interrupt {
     requested: Arc<AtomicBool>,
 }
-
-/// The user asked to stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("interrupted; nothing was written")]
-pub struct Interrupted;
 
 impl Interrupt {
     /// Catch Ctrl-C and SIGTERM from now on. The first asks the work to end, the second ends the process at once.

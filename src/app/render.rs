@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use serde_json::{Map, Value, json};
 
 use super::cli::{Channel, Display, Global, Rays, RenderArgs};
-use super::console::{Console, Verbosity};
+use super::console::{Console, Verbosity, Watcher};
 use super::interrupt::Interrupt;
 use super::output::Measured;
 use super::stage::Stage;
@@ -215,15 +215,15 @@ pub fn run(
     interrupt.check()?;
     let stage = Stage::new(&context, request, &time_line)?;
     let film = Film::new(&context, request.width, request.height)?;
-    let mut method = time_line.span("prepare method", || frame::Method::prepare(&context, request, &stage))?;
-    let progress = console.progress(request.method.key, u64::from(request.spp) * u64::from(request.frames));
+    let watch = Watcher::new(console, interrupt);
+    let mut method = time_line.span("prepare method", || frame::Method::prepare(&context, request, &stage, &watch))?;
     for number in 0..request.frames {
         interrupt.check()?;
         if let (Some(capture), true) = (&mut capture, number + 1 == request.frames) {
             capture.start();
         }
         let name = format!("frame {number}");
-        time_line.span(&name, || method.frame(&context, request, &stage, &film, &progress, interrupt))?;
+        time_line.span(&name, || method.frame(&context, request, &stage, &film, &watch))?;
     }
     if let Some(capture) = capture {
         time_line.span("write capture", || capture.finish())?;

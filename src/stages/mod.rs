@@ -13,4 +13,5 @@ pub mod punctual;
 pub mod scan;
 pub mod trace;
 pub mod view;
+pub mod work;
 pub mod world;

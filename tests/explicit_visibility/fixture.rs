@@ -10,6 +10,7 @@ use linklight::scene::tessellate::{Fineness, tessellate};
 use linklight::scene::{self, LoadOptions, Scene, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::trace::Tracer;
+use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
 
 const MEMORY: u64 = 1 << 30;
@@ -68,6 +69,7 @@ impl Fixture {
             environment: &self.environment,
             world: &self.world,
             tracer: Tracer::compute(&self.bvh, &self.world),
+            watch: &Unwatched,
         }
     }
 

@@ -8,6 +8,7 @@ use crate::scene::environment::Environment;
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
 use crate::stages::trace;
+use crate::stages::work::Interrupted;
 use crate::stages::world::WorldEnvironment;
 
 /// Rays of a batch, where memory allows.
@@ -20,6 +21,8 @@ pub enum ExplicitError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Link(#[from] LinkError),
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     #[error(
         "explicit visibility needs {needed} bytes beside its links for {elements} elements, {available} are available; \
          lower --elements or rays_per_element"
@@ -89,6 +92,7 @@ pub(super) fn build(
     let counts = LinkCounts { receivers: elements.count, senders: elements.count, rays: ray_count, batch };
     let mut builder = LinkBuilder::new(context, format, counts, sizes.link_budget)?;
     for first_element in (0..elements.count).step_by(batch as usize) {
+        stage.watch.step("links", first_element.into(), elements.count.into())?;
         let range = first_element..elements.count.min(first_element + batch);
         let batch_rays = range.len() * ray_count as usize;
         let mut recorder = context.recorder("links")?;
@@ -110,6 +114,7 @@ pub(super) fn build(
         recorder.submit()?;
         builder.append(range)?;
     }
+    stage.watch.step("links", elements.count.into(), elements.count.into())?;
     Ok(builder.finish())
 }
 

@@ -48,6 +48,7 @@ use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::emitters::{EmitterChoice, Emitters};
 use crate::stages::links::{Links, Outcomes};
 use crate::stages::trace::Tracer;
+use crate::stages::work::Watch;
 use crate::stages::world::{World, WorldEnvironment};
 use crate::stages::{gather, punctual};
 use glam::Vec3;
@@ -116,6 +117,8 @@ pub struct Stage<'a> {
     pub environment: &'a Environment,
     pub world: &'a World,
     pub tracer: Tracer<'a>,
+    /// Hears how far link generation is.
+    pub watch: &'a dyn Watch,
 }
 
 impl ExplicitVisibility {
