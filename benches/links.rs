@@ -16,6 +16,7 @@ use linklight::stages::bvh::Bvh;
 use linklight::stages::gather;
 use linklight::stages::links::Link;
 use linklight::stages::trace::Tracer;
+use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
@@ -55,6 +56,7 @@ impl Prepared {
             environment: &Environment::default(),
             world: &self.world,
             tracer: Tracer::compute(&self.bvh, &self.world),
+            watch: &Unwatched,
         };
         ExplicitVisibility::prepare(context, &stage, settings).unwrap()
     }
