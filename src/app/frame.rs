@@ -8,6 +8,7 @@ use crate::display::g_buffer::GBuffer;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
+use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{self, ExplicitVisibility};
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
@@ -18,6 +19,14 @@ use crate::stages::work::Watch;
 pub enum Method {
     PathTracing(Box<PathTracing>),
     ExplicitVisibility(Box<VertexShown>),
+    Antiradiance(Box<AntiradianceShown>),
+}
+
+/// Antiradiance with the display stage that shows it.
+pub struct AntiradianceShown {
+    method: Antiradiance,
+    shadow_maps: ShadowMaps,
+    g_buffer: GBuffer,
 }
 
 /// Explicit visibility with the display stage that shows it.
@@ -69,6 +78,14 @@ impl Method {
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
                 let g_buffer = GBuffer::new(context, request.width, request.height)?;
                 Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer })))
+            }
+            "antiradiance" => {
+                let method = Antiradiance::prepare(context, &explicit_stage(stage), request.settings()?);
+                let method = method.map_err(AppError::failed)?;
+                tracing::info!("{}", method.report());
+                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+                let g_buffer = GBuffer::new(context, request.width, request.height)?;
+                Ok(Self::Antiradiance(Box::new(AntiradianceShown { method, shadow_maps, g_buffer })))
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
@@ -125,6 +142,23 @@ impl Method {
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });
                 recorder.submit()?;
+                Ok(())
+            }
+            Self::Antiradiance(shown) => {
+                let AntiradianceShown { method, shadow_maps, g_buffer } = &mut **shown;
+                method.solve(context, world, request.bounces).map_err(AppError::failed)?;
+                let mut recorder = context.recorder("frame")?;
+                recorder.scope("display", |recorder| {
+                    let light = VertexLight {
+                        direct_irradiance: method.direct_irradiance(),
+                        indirect_irradiance: method.indirect_irradiance(),
+                        back_elements: method.back_elements(),
+                    };
+                    shadow_maps.draw(recorder, world, pose, *bounds);
+                    vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                });
+                recorder.submit()?;
+                progress.advance(u64::from(request.spp));
                 Ok(())
             }
         }

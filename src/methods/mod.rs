@@ -3,6 +3,7 @@
 //! [`METHODS`] is the table of contents. Comments cite as `[Key section, Eq. n]`; the Keys are in [`PAPERS`]. Where a
 //! bare `[Key]` stands in documentation, a last line `[Key]: crate::methods::PAPERS` makes it a link.
 
+pub mod antiradiance;
 pub mod explicit_visibility;
 mod papers;
 pub mod path_tracing;
@@ -13,7 +14,7 @@ use serde_json::{Map, Value};
 
 pub use papers::{PAPERS, Paper};
 
-use papers::{KAJIYA_1986, SCHMITZ_2008};
+use papers::{DACHSBACHER_2007, KAJIYA_1986, SCHMITZ_2008};
 use settings::{Assignment, SettingError, SettingGroup, Spec};
 
 /// Values of all settings by name, or what is wrong with an assignment.
@@ -53,6 +54,11 @@ pub const METHODS: &[Method] = &[
         "explicit-visibility",
         &SCHMITZ_2008,
         "vertex-to-vertex links found by ray casting; light is gathered along them",
+    ),
+    Method::new::<antiradiance::Settings>(
+        "antiradiance",
+        &DACHSBACHER_2007,
+        "light crosses surfaces freely, and negative light sent on by each surface takes away what was blocked",
     ),
     Method::new::<path_tracing::Settings>(
         "path-tracing",

@@ -24,6 +24,15 @@ pub(super) const SCHMITZ_2008: Paper = Paper {
     doi: Some("10.1111/j.1467-8659.2008.01347.x"),
 };
 
+pub(super) const DACHSBACHER_2007: Paper = Paper {
+    key: "Dachsbacher2007",
+    title: "Implicit Visibility and Antiradiance for Interactive Global Illumination",
+    authors: "Carsten Dachsbacher, Marc Stamminger, George Drettakis, Fr\u{e9}do Durand",
+    year: 2007,
+    venue: "ACM Transactions on Graphics 26(3), SIGGRAPH",
+    doi: Some("10.1145/1276377.1276453"),
+};
+
 pub(super) const KAJIYA_1986: Paper = Paper {
     key: "Kajiya1986",
     title: "The Rendering Equation",
@@ -76,6 +85,7 @@ pub const PAPERS: &[Paper] = &[
         venue: "SIAM Journal on Numerical Analysis 13(6)",
         doi: Some("10.1137/0713071"),
     },
+    DACHSBACHER_2007,
     Paper {
         key: "Duff2017",
         title: "Building an Orthonormal Basis, Revisited",

@@ -19,6 +19,7 @@ pub mod geometry;
 pub mod gltf;
 pub mod pose;
 pub mod shapes;
+pub mod surfaces;
 pub mod tessellate;
 
 pub use builtin::{OpenError, open};

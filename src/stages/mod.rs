@@ -1,11 +1,13 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
 pub mod bvh;
+pub mod direction_bins;
 pub mod elements;
 pub mod emissive_triangles;
 pub mod emitters;
 pub mod film;
 pub mod gather;
+pub mod hierarchy;
 pub mod levels;
 pub mod links;
 pub mod pair_queue;

@@ -42,11 +42,11 @@ pub struct PairQueuePlan {
 }
 
 impl PairQueuePlan {
-    /// Pairs on the stack: the seeds, and on each level what is left of a step's children.
+    /// Pairs on the stack: the seeds, on each level what is left of a step's children, and as much again for one step
+    /// more as it takes to never run short.
     pub fn capacity(&self) -> u32 {
         let growth = u64::from(self.max_children.saturating_sub(1));
-        // Twice, since a step uses at most half of the room.
-        let room = 2 * growth * (u64::from(self.batch) + u64::from(self.levels) * u64::from(self.batch));
+        let room = growth * u64::from(self.batch) * (u64::from(self.levels) + 2);
         u32::try_from(u64::from(self.seeds) + room.max(1)).unwrap_or(u32::MAX)
     }
 

@@ -1,0 +1,35 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/hierarchy.glsl"
+
+// One thread per node of one level: an inner node's area, centre of area and bounding sphere from its children's.
+// reads level_nodes[node_count]   updates nodes[node_count]; the level below is already done   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer LevelNodes { uint level_nodes[]; };
+layout(set = 0, binding = 1, scalar) buffer Nodes { HierarchyNode nodes[]; };
+layout(push_constant, scalar) uniform Params { uint first; uint count; } params;
+
+void main()
+{
+    uint k = linear_index();
+    if (k >= params.count) return;
+    uint node = level_nodes[params.first + k];
+    if (nodes[node].leaf != NONE) return;
+
+    uint end = nodes[node].skip;
+    vec3 weighted = vec3(0.0), sum = vec3(0.0);
+    float area = 0.0, count = 0.0;
+    for (uint child = node + 1; child < end; child = nodes[child].skip) {
+        weighted += nodes[child].area * nodes[child].center;
+        sum += nodes[child].center;
+        area += nodes[child].area;
+        count += 1.0;
+    }
+    vec3 center = area > 0.0 ? weighted / area : sum / count;
+    float radius = 0.0;
+    for (uint child = node + 1; child < end; child = nodes[child].skip)
+        radius = max(radius, distance(center, nodes[child].center) + nodes[child].radius);
+    nodes[node].center = center;
+    nodes[node].radius = radius;
+    nodes[node].area = area;
+}

@@ -1,0 +1,46 @@
+#ifndef LIB_DIRECTION_BINS
+#define LIB_DIRECTION_BINS
+// The sphere in m = 8 k^2 bins of equal area: each half of it (about +z, about -z) a square of 2k x 2k cells, k x k an
+// octant, folded to the disc and lifted. Opposite directions lie in opposite bins.      [Shirley1997; octants as in Praun2003]
+// A direction is always that of propagation, at the sender and at the receiver alike.
+
+// Bin of a unit direction; side = 2k.
+uint bin_of(vec3 w, uint side)
+{
+    float r = sqrt(max(1.0 - abs(w.z), 0.0));
+    vec2 p = vec2(0.0);
+    if (w.x != 0.0 || w.y != 0.0) {
+        // From the disc to the square: the inverse of concentric_disc.
+        if (abs(w.x) > abs(w.y)) {
+            p.x = w.x > 0.0 ? r : -r;
+            p.y = p.x * atan(w.y / w.x) * (4.0 / 3.14159265358979);
+        } else {
+            p.y = w.y > 0.0 ? r : -r;
+            p.x = p.y * atan(w.x / w.y) * (4.0 / 3.14159265358979);
+        }
+    }
+    uvec2 cell = min(uvec2(max((p * 0.5 + 0.5) * float(side), vec2(0.0))), uvec2(side - 1));
+    return ((w.z < 0.0 ? side : 0u) + cell.y) * side + cell.x;
+}
+
+// |cosine| that stands for a whole bin at an element: never less than the mean over a bin that its plane cuts in two.
+// `norm` makes the sum of cosine times bin solid angle over either side pi.
+float discrete_cosine(float cosine, float norm, uint bin_count)
+{
+    return norm * max(abs(cosine), 0.5 / sqrt(float(bin_count)));
+}
+
+// What a kernel that makes links needs to know of the bins.
+struct BinParams {
+    uint side;              // 2k
+    uint count;             // m
+    uint class_count;       // of senders larger than a bin; 0: nothing is spread
+    uint is_gaussian;       // larger senders are read in one bin and spread by a Gaussian
+};
+
+// An entry of a list of bins around a bin.
+struct SpreadEntry {
+    uint bin;
+    float weight;
+};
+#endif

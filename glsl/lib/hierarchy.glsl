@@ -1,0 +1,28 @@
+#ifndef LIB_HIERARCHY
+#define LIB_HIERARCHY
+// A hierarchy over leaf elements in depth-first order: the children of a node stand behind it, each after the other's
+// subtree. Filled by stages/hierarchy.
+struct HierarchyNode {
+    vec3 center;        // of area, metres
+    float radius;       // of a sphere around center that holds everything below, metres
+    float area;         // of all leaves below, m2
+    uint skip;          // first node after the subtree
+    uint parent;        // NONE for the root
+    uint leaf;          // index of the leaf, NONE for an inner node
+    uint surface;       // the flat surface that all below lies in, else NONE
+    float margin;       // how far anything below may move from its place at rest, metres
+};
+
+// One per vertex: both sides of its cell.
+struct HierarchyLeaf {
+    vec3 normal;        // unit, of the cell's vector area
+    float area;         // length of the vector area, m2
+    uint node;
+    uint element;       // of the front
+    uint back_element;  // NONE where one-sided
+    uint flags;
+};
+const uint NONE = 0xffffffffu;
+const uint BLOCKS_BEHIND = 1u;      // light that meets the back is blocked
+const uint REFLECTS_BEHIND = 2u;    // the back reflects like the front
+#endif

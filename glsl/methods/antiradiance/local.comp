@@ -1,0 +1,111 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/direction_bins.glsl"
+#include "lib/hierarchy.glsl"
+
+// One workgroup per leaf: incident radiance becomes irradiance of both sides, reflected radiance, and antiradiance, which
+// goes on where the light came from, negated.                                       [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
+// reads leaves, cosine_norms, bin_directions, incident[node_count * bin_count], environment[bin_count] (W m^-2 sr^-1),
+//       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count]
+// updates radiosity[2 leaf_count] (W/m2), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
+// writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
+// shared 64 x (irradiance of both sides)
+// Differs from [Dachsbacher2007]: one leaf is both sides of a surface; open surfaces take away light from behind as well.
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint WORDS = 3;    // of an entry of the tables: 3 (f32) or 2 (f16)
+layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Incident { uint incident[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Environment { vec3 environment[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Source { vec3 source[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 7, scalar) buffer Radiosity { vec3 radiosity[]; };
+layout(set = 0, binding = 8, scalar) buffer Exitant { uint exitant[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer Residuals { vec2 residuals[]; };
+layout(push_constant, scalar) uniform Params {
+    uint leaf_count;
+    uint bin_count;
+    uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
+    uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
+} params;
+
+#include "methods/antiradiance/table.glsl"
+
+const float PI = 3.14159265358979;
+shared vec3 sh_front[64], sh_back[64];
+shared float sh_changed[64], sh_present[64];
+
+vec3 incident_in(uint row, uint bin)
+{
+    vec3 arriving = LOAD_ENTRY(incident, row + bin);
+    return params.add_environment != 0 ? arriving + environment[bin] : arriving;
+}
+
+void main()
+{
+    uint leaf = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x, thread = gl_LocalInvocationID.x;
+    if (leaf >= params.leaf_count) return;
+    HierarchyLeaf own = leaves[leaf];
+    uint row = own.node * params.bin_count;
+    bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0, reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
+    float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(params.bin_count);
+
+    // What travels against the normal arrives at the front.
+    vec3 front = vec3(0.0), back = vec3(0.0);
+    for (uint bin = thread; bin < params.bin_count; bin += 64) {
+        float cosine = dot(own.normal, bin_directions[bin]);
+        vec3 arriving = discrete_cosine(cosine, norm, params.bin_count) * bin_solid_angle * incident_in(row, bin);
+        if (cosine <= 0.0) front += arriving;
+        else back += arriving;
+    }
+    sh_front[thread] = front;
+    sh_back[thread] = back;
+    barrier();
+    for (uint half_count = 32; half_count > 0; half_count /= 2) {
+        if (thread < half_count) {
+            sh_front[thread] += sh_front[thread + half_count];
+            sh_back[thread] += sh_back[thread + half_count];
+        }
+        barrier();
+    }
+    front = sh_front[0];
+    back = reflects_behind ? sh_back[0] : vec3(0.0);
+
+    vec3 b_front = radiosity[2 * leaf], b_back = radiosity[2 * leaf + 1];
+    if (params.update_radiosity != 0) {
+        b_front = source[2 * leaf] + albedo[own.element] * front;
+        b_back = source[2 * leaf + 1] + (reflects_behind ? albedo[own.back_element] * back : vec3(0.0));
+    }
+
+    float changed = 0.0, present = 0.0;
+    for (uint bin = thread; bin < params.bin_count; bin += 64) {
+        float cosine = dot(own.normal, bin_directions[bin]);
+        bool leaves_front = cosine > 0.0;
+        vec3 radiance = (leaves_front ? b_front : b_back) / PI;
+        if (!leaves_front || blocks_behind) radiance -= incident_in(row, bin);
+        vec3 intensity = discrete_cosine(cosine, norm, params.bin_count) * radiance;
+        vec3 change = abs(intensity - LOAD_ENTRY(exitant, row + bin));
+        changed += change.r + change.g + change.b;
+        present += abs(intensity.r) + abs(intensity.g) + abs(intensity.b);
+        STORE_ENTRY(exitant, row + bin, intensity);
+    }
+    sh_changed[thread] = changed;
+    sh_present[thread] = present;
+    barrier();
+    for (uint half_count = 32; half_count > 0; half_count /= 2) {
+        if (thread < half_count) {
+            sh_changed[thread] += sh_changed[thread + half_count];
+            sh_present[thread] += sh_present[thread + half_count];
+        }
+        barrier();
+    }
+    if (thread == 0) {
+        irradiance[2 * leaf] = front;
+        irradiance[2 * leaf + 1] = back;
+        radiosity[2 * leaf] = b_front;
+        radiosity[2 * leaf + 1] = b_back;
+        residuals[leaf] = own.area * bin_solid_angle * vec2(sh_changed[0], sh_present[0]);
+    }
+}

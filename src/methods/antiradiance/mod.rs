@@ -1,0 +1,460 @@
+//! Antiradiance [Dachsbacher2007]: light crosses surfaces freely, and each surface sends on, as negative light, what hit
+//! it; the two cancel where something was in the way.
+//!
+//! No ray is cast between elements. A hierarchy of leaves exchanges light along links chosen by size and distance alone;
+//! each node keeps its light by direction, in bins of equal solid angle. A step carries reflected light less
+//! antiradiance along all links, without visibility; at the leaves, what arrived is reflected, and goes on negated where
+//! it came from. Iterated, the negative light grows into the shadows.
+//!
+//! | paper | here | unit | buffer |
+//! |---|---|---|---|
+//! | P_i, x_i, n_i, a_i | leaf; centre, normal, area | m, –, m2 | [`Hierarchy::nodes`], [`Hierarchy::leaves`] |
+//! | omega_j, m | bin and its direction, [`Settings::bins`] | –, 1 | [`DeviceBins::directions`] |
+//! | omega_bin | 4 pi / m | sr | – |
+//! | I_ex = I_L - I_A | `exitant`, per area of its node | W m^-2 sr^-1 | `antiradiance/exitant` |
+//! | L_in | `incident` | W m^-2 sr^-1 | `antiradiance/incident` |
+//! | F | weight of a transfer, times the sender's area | 1 | [`Transfers`] |
+//! | U | global pass and push | – | [`Transfers::gather`] |
+//! | K, J | local pass: reflection, go-through | – | – |
+//! | E | `source`, as radiosity | W/m2 | `antiradiance/source` |
+//! | A | the negative part of `exitant` | W m^-2 sr^-1 | `antiradiance/exitant` |
+//!
+//! **Per frame without link work:** lights, emission that stays where it is, albedo, the environment. **With new form
+//! factors over standing links:** surfaces that move within [`Settings::motion_margin`]. **With new links:** any motion
+//! ([`Antiradiance::follow`]).
+//!
+//! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
+//! and bins at leaves are those of the actual direction; a sender larger than a bin is read in every bin that it covers
+//! (selectable); open surfaces block light that meets their backs; near senders are discs, never more than half of the
+//! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
+//! What it does not do: transparent surfaces, and refinement by the light that is sent.
+//!
+//! [Dachsbacher2007]: crate::methods::PAPERS
+
+mod bin_count;
+mod linking;
+mod report;
+mod scheme;
+mod tables;
+
+pub use bin_count::BinCount;
+pub use linking::{LinkingError, NodeLinks, TransferWindow, Transfers, link_solid_angle};
+pub use report::Report;
+pub use scheme::{Residual, growth_rate};
+pub use tables::{LocalStep, Tables, binned};
+
+pub use super::explicit_visibility::Stage;
+use crate::gpu::shaders::methods::antiradiance as passes;
+use crate::gpu::shaders::types::Ray;
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::surfaces::Surfaces;
+use crate::stages::direction_bins::{DeviceBins, Spread};
+use crate::stages::elements::{ElementTopology, Elements};
+use crate::stages::emitters::{EmitterChoice, Emitters};
+use crate::stages::hierarchy::{Behind, Hierarchy, HierarchyPlan};
+use crate::stages::punctual;
+use crate::stages::world::World;
+use glam::Vec3;
+
+crate::choice! {
+    /// The order of the steps.
+    pub enum Scheme {
+        /// For each bounce, antiradiance is moved on until it settles; then light is reflected. Bounces are exact
+        Asymmetric = "asymmetric",
+        /// Each step reflects light and moves antiradiance on. Holds light of all bounces up to the number of iterations
+        Symmetric = "symmetric",
+    }
+}
+
+crate::choice! {
+    /// Which surfaces take away light that meets their backs.
+    pub enum Backs {
+        /// All but the outsides of closed meshes
+        Open = "open",
+        /// All
+        All = "all",
+        /// Double-sided materials alone, as in the paper
+        None = "none",
+    }
+}
+
+crate::settings! {
+    /// What antiradiance lets the user choose.
+    pub struct Settings {
+        /// Direction bins over the sphere: 8 k^2.
+        bins: BinCount = BinCount::of_octant_side(4), paper "128 (128 to 1024)";
+        /// The order of the steps.
+        scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
+        /// Steps of the symmetric scheme.
+        iterations: u32 = 8, range 1..=1000, unit "steps", paper "4 (8 for the finest pictures)";
+        /// Steps for antiradiance to settle, per bounce, at most: surfaces one behind the other that light crosses.
+        depth: u32 = 8, range 1..=1000, unit "steps", paper "the scene's depth complexity";
+        /// Antiradiance has settled where a step changes less than this share of the light.
+        tolerance: f32 = 0.002, range 0.0..=1.0, paper "not given";
+        /// How a sender larger than a bin spreads over the receiver's bins.
+        spread: Spread = Spread::Cone, paper "gaussian";
+        /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
+        refinement: f32 = 1.0, range 0.01..=100.0, unit "bins", paper "1";
+        /// Which surfaces take away light that meets their backs.
+        backs: Backs = Backs::Open, paper "none: solids only";
+        /// Keep the tables in f16: two thirds of the memory.
+        half_tables: bool = false, paper "on";
+        /// How far animated parts may move before links are made anew; form factors follow in between.
+        motion_margin: f32 = 0.0, range 0.0..=1e6, unit "m", paper "bounds stated per object";
+        /// Average indirect light over the one-ring.
+        smoothing: bool = true, paper "splatting or vertex interpolation";
+        /// Neighbours take part in smoothing where normals differ by less than this.
+        feature_angle: f32 = 30.0, range 0.0..=180.0, unit "degrees", paper "not given";
+        /// How light of emissive surfaces reaches the elements directly.
+        emitters: EmitterChoice = EmitterChoice::Auto, paper "as elements";
+        /// Points on sampled emitters, together; each element casts a shadow ray to every one.
+        emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
+        /// How far shadow rays start off their surface, as a share of the scene's extent.
+        ray_offset: f32 = 1e-5, range 1e-7..=1e-2, paper "not given";
+    }
+}
+
+/// Why the method cannot go on.
+#[derive(Debug, thiserror::Error)]
+pub enum AntiradianceError {
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Linking(#[from] LinkingError),
+    #[error(
+        "antiradiance: {what} of {nodes} nodes and {bins} bins needs {needed} bytes, {available} are available; lower \
+         bins or --elements{}", if *.half { "" } else { ", or set half_tables=true" }
+    )]
+    OutOfMemory { what: &'static str, nodes: u64, bins: u32, half: bool, needed: u64, available: u64 },
+    #[error(
+        "antiradiance grows: after {steps} steps of the {scheme} scheme changes are multiplied by about {rate:.2} each \
+         step (spectral radius above 1); use scheme=asymmetric, spread=cone, or fewer bins"
+    )]
+    Growth { steps: u32, rate: f64, scheme: &'static str },
+}
+
+/// The method on one scene: hierarchy, links, tables.
+pub struct Antiradiance {
+    settings: Settings,
+    elements: Elements,
+    emitters: Emitters,
+    hierarchy: Hierarchy,
+    bins: DeviceBins,
+    links: NodeLinks,
+    transfers: Transfers,
+    tables: Tables,
+    state: State,
+    residuals: Vec<Residual>,
+    report: Report,
+}
+
+/// Light by element, W/m2, and scratch.
+struct State {
+    irradiance: Buffer<Vec3>,
+    punctual: Buffer<Vec3>,
+    /// From emitters and the environment.
+    direct: Buffer<Vec3>,
+    indirect: Buffer<Vec3>,
+    smoothed: Buffer<Vec3>,
+    /// Per light, then per element; 0..1.
+    visibility: Buffer<f32>,
+    /// Shadow rays of a batch, and their answers.
+    rays: Buffer<Ray>,
+    is_free: Buffer<u32>,
+}
+
+/// Shadow rays of a batch.
+const SHADOW_RAYS: usize = 1 << 19;
+
+impl Antiradiance {
+    /// Makes elements, hierarchy and links, and casts all shadow rays: everything but the light itself.
+    pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, AntiradianceError> {
+        Self::prepare_within(context, stage, settings, u64::MAX)
+    }
+
+    /// As [`Self::prepare`], within `budget` bytes of device memory.
+    pub fn prepare_within(
+        context: &Context,
+        stage: &Stage<'_>,
+        settings: Settings,
+        budget: u64,
+    ) -> Result<Self, AntiradianceError> {
+        let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
+        let elements = Elements::new(context, topology, stage.rest_positions, stage.world, settings.ray_offset)?;
+        let (choice, samples) = (settings.emitters, settings.emitter_samples);
+        let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
+
+        let surfaces = Surfaces::new(stage.geometry, stage.rest_positions);
+        let behind = match settings.backs {
+            Backs::Open => Behind::BlockOpen,
+            Backs::All => Behind::BlockAll,
+            Backs::None => Behind::Pass,
+        };
+        let moves = moving_parts(stage);
+        let margin = |vertex: u32| {
+            let part = stage.geometry.vertex_part[vertex as usize];
+            if moves[part as usize] { settings.motion_margin } else { 0.0 }
+        };
+        let plan = HierarchyPlan::new(&elements, &surfaces, stage.rest_positions, behind, margin);
+        let budget = check_memory(context, &plan, &settings, budget)?;
+        let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
+        let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
+        let tables = Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables)?;
+        let mut recorder = context.recorder("antiradiance")?;
+        tables.update_norms(&mut recorder, &hierarchy, &bins);
+        recorder.submit()?;
+
+        let links = NodeLinks::refine(context, &hierarchy, link_solid_angle(&settings), budget)?;
+        let transfers = Transfers::new(context, &links, &hierarchy, &bins, &tables.cosine_norms, &settings, budget)?;
+        let mut method = Self {
+            report: Report::new(&settings, &elements, &emitters, &hierarchy, &links, &transfers),
+            state: State::new(context, &elements, stage.world.light_count)?,
+            residuals: Vec::new(),
+            settings,
+            elements,
+            emitters,
+            hierarchy,
+            bins,
+            links,
+            transfers,
+            tables,
+        };
+        method.trace(context, stage)?;
+        Ok(method)
+    }
+
+    /// Follows surfaces that moved or deformed (the world is posed, the tracer refitted): links made anew, or, with
+    /// `standing_links`, new form factors over the links there are.        [Dachsbacher2007 3.3]
+    pub fn follow(
+        &mut self,
+        context: &Context,
+        stage: &Stage<'_>,
+        standing_links: bool,
+    ) -> Result<(), AntiradianceError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        self.elements.place(&mut recorder, stage.world);
+        self.elements.update_materials(&mut recorder, stage.world);
+        self.hierarchy.place(&mut recorder, &self.elements, stage.world);
+        self.tables.update_norms(&mut recorder, &self.hierarchy, &self.bins);
+        recorder.submit()?;
+        if !standing_links {
+            self.links = NodeLinks::refine(context, &self.hierarchy, link_solid_angle(&self.settings), u64::MAX)?;
+        }
+        // The old ones go first: two sets may not fit.
+        self.transfers.windows.clear();
+        self.transfers = Transfers::new(
+            context,
+            &self.links,
+            &self.hierarchy,
+            &self.bins,
+            &self.tables.cosine_norms,
+            &self.settings,
+            u64::MAX,
+        )?;
+        self.report =
+            Report::new(&self.settings, &self.elements, &self.emitters, &self.hierarchy, &self.links, &self.transfers);
+        self.trace(context, stage)
+    }
+
+    /// Casts the shadow rays to lights and emitters anew.
+    pub fn trace(&mut self, context: &Context, stage: &Stage<'_>) -> Result<(), AntiradianceError> {
+        let State { rays, is_free, visibility, .. } = &self.state;
+        let (tracer, world, elements) = (&stage.tracer, stage.world, &self.elements);
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.scope("trace emitters", |recorder| {
+            self.emitters.trace(recorder, tracer, world, elements, rays, is_free);
+        });
+        recorder.scope("trace lights", |recorder| {
+            punctual::trace_visibility(recorder, tracer, world, elements, rays, is_free, visibility);
+        });
+        Ok(recorder.submit()?)
+    }
+
+    /// Takes over the world's present materials: no link work.
+    pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
+        self.elements.update_materials(recorder, world);
+    }
+
+    /// The light of direct illumination and `bounces` more.                                 [Dachsbacher2007 4.2]
+    pub fn solve(&mut self, context: &Context, world: &World, bounces: u32) -> Result<(), AntiradianceError> {
+        self.residuals.clear();
+        self.solve_linked(context)?;
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.scope("direct", |recorder| self.direct_light(recorder, world));
+        recorder.submit()?;
+        self.solve_indirect(context, bounces)?;
+
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.scope("to elements", |recorder| {
+            self.to_elements(recorder, &self.tables.irradiance, &self.state.indirect);
+            if self.settings.smoothing {
+                let feature_angle = self.settings.feature_angle.to_radians();
+                self.elements.smooth(recorder, feature_angle, &self.state.indirect, &self.state.smoothed);
+            }
+        });
+        Ok(recorder.submit()?)
+    }
+
+    /// Direct light on the elements: by kind, and what needs no link in `irradiance`.
+    fn direct_light(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let (elements, s) = (&self.elements, &self.state);
+        punctual::irradiance(recorder, world, elements, &s.visibility, &s.punctual);
+        self.emitters.irradiance(recorder, world, elements, &s.irradiance);
+        self.to_elements(recorder, &self.tables.linked, &s.direct);
+        elements.add(recorder, &s.irradiance, &s.direct);
+        elements.add(recorder, &s.punctual, &s.irradiance);
+    }
+
+    /// The leaves' sources: what they emit along links, or what they reflect of all direct light.
+    fn sources(&self, recorder: &mut Recorder<'_>, is_emission: bool) {
+        let leaf_count = self.hierarchy.leaf_count();
+        let pass = passes::Sources {
+            leaves: &self.hierarchy.leaves,
+            albedo: &self.elements.albedo,
+            emission: &self.elements.emission,
+            is_sampled: &self.emitters.is_sampled,
+            direct_irradiance: &self.state.irradiance,
+            linked_irradiance: &self.tables.linked,
+            source: &self.tables.source,
+            radiosity: &self.tables.radiosity,
+            params: passes::SourcesParams { leaf_count, is_emission: u32::from(is_emission) },
+        };
+        recorder.dispatch(&pass, leaf_count);
+    }
+
+    fn to_elements(&self, recorder: &mut Recorder<'_>, leaf_irradiance: &Buffer<Vec3>, irradiance: &Buffer<Vec3>) {
+        let leaf_count = self.hierarchy.leaf_count();
+        recorder.fill(irradiance, 0);
+        let pass = passes::ToElements {
+            leaves: &self.hierarchy.leaves,
+            leaf_irradiance,
+            irradiance,
+            params: passes::ToElementsParams { leaf_count },
+        };
+        recorder.dispatch(&pass, leaf_count);
+    }
+
+    /// Per vertex: the element of its back, u32::MAX where the surface is one-sided.
+    pub fn back_elements(&self) -> &Buffer<u32> {
+        &self.elements.back_elements
+    }
+
+    /// Sum over bounces, smoothed if the settings say so; W/m2 per element.
+    pub fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        if self.settings.smoothing { &self.state.smoothed } else { &self.state.indirect }
+    }
+
+    /// From emitters and the environment, unreflected; W/m2 per element.
+    pub fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.direct
+    }
+
+    /// From punctual lights, unreflected; W/m2 per element.
+    pub fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.punctual
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    pub fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
+    }
+
+    pub fn bins(&self) -> &DeviceBins {
+        &self.bins
+    }
+
+    pub fn links(&self) -> &NodeLinks {
+        &self.links
+    }
+
+    pub fn transfers(&self) -> &Transfers {
+        &self.transfers
+    }
+
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// Of the last solve, step by step.
+    pub fn residuals(&self) -> &[Residual] {
+        &self.residuals
+    }
+
+    /// What was counted when the links were last made.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+impl State {
+    fn new(context: &Context, elements: &Elements, light_count: u32) -> Result<Self, GpuError> {
+        let count = elements.count as usize;
+        Ok(Self {
+            irradiance: context.buffer("antiradiance/direct irradiance", count)?,
+            punctual: context.buffer("antiradiance/punctual", count)?,
+            direct: context.buffer("antiradiance/direct", count)?,
+            indirect: context.buffer("antiradiance/indirect", count)?,
+            smoothed: context.buffer("antiradiance/smoothed", count)?,
+            visibility: context.buffer("antiradiance/visibility", count * light_count as usize)?,
+            rays: context.buffer("antiradiance/shadow rays", SHADOW_RAYS)?,
+            is_free: context.buffer("antiradiance/is free", SHADOW_RAYS)?,
+        })
+    }
+}
+
+/// Refuses tables that do not fit; what is left of `budget` for links.
+fn check_memory(
+    context: &Context,
+    plan: &HierarchyPlan,
+    settings: &Settings,
+    budget: u64,
+) -> Result<u64, AntiradianceError> {
+    let (nodes, bins, half) = (plan.nodes.len() as u64, settings.bins.get(), settings.half_tables);
+    let refuse =
+        |what, needed, available| Err(AntiradianceError::OutOfMemory { what, nodes, bins, half, needed, available });
+    let table = Tables::table_bytes(nodes as u32, bins, half);
+    let cells = 4 * (nodes * u64::from(bins) + 1);
+    let largest = context.limits().storage_buffer_bytes;
+    if table.max(cells) > largest || nodes * u64::from(bins) > u64::from(u32::MAX) {
+        return refuse("one table", table.max(cells), largest);
+    }
+    let needed = 2 * table + cells;
+    let available = budget.min(context.available_bytes());
+    if needed > available {
+        return refuse("the tables", needed, available);
+    }
+    Ok(budget - needed)
+}
+
+/// Per part: whether an animation moves it.
+fn moving_parts(stage: &Stage<'_>) -> Vec<bool> {
+    let scene = stage.scene;
+    let mut moves = vec![false; scene.nodes.len()];
+    for channel in scene.clips.iter().flat_map(|clip| &clip.channels) {
+        if let Some(node) = moves.get_mut(channel.node as usize) {
+            *node = true;
+        }
+    }
+    let is_moved = |mut node: u32| {
+        // As many steps up as there are nodes, at most.
+        for _ in 0..moves.len() {
+            if moves[node as usize] {
+                return true;
+            }
+            match scene.nodes[node as usize].parent {
+                Some(parent) => node = parent,
+                None => break,
+            }
+        }
+        false
+    };
+    let parts = stage.geometry.parts.iter();
+    parts.map(|part| is_moved(part.node) || part.skin_offset.is_some()).collect()
+}

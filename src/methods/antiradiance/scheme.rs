@@ -1,0 +1,174 @@
+//! The iterations: antiradiance alone until it has settled, or light and antiradiance together; and the watch over both.
+
+use super::tables::LocalStep;
+use super::{Antiradiance, AntiradianceError, Scheme};
+use crate::gpu::{Context, GpuError};
+use serde::Serialize;
+
+/// Change of the exitant light, of the most there was, beyond which an iteration is said to grow.
+const GROWTH_LIMIT: f64 = 1e3;
+/// Steps over which a growth rate is estimated.
+const GROWTH_STEPS: usize = 4;
+
+/// One step of an iteration.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Residual {
+    /// Steps so far, this one counted.
+    pub step: u32,
+    /// Bounce that the step belongs to; 0: direct light of emitters and environment.
+    pub bounce: u32,
+    /// Whether light was reflected anew, beside antiradiance.
+    pub reflects: bool,
+    /// Change of the exitant light, sum of its magnitudes over leaves, bins and channels, W.
+    pub change: f64,
+    /// The exitant light itself, the same sum, W.
+    pub total: f64,
+}
+
+impl Residual {
+    /// Change as a share of what there is.
+    pub fn relative(&self) -> f64 {
+        if self.total > 0.0 { self.change / self.total } else { 0.0 }
+    }
+}
+
+/// Factor per step by which changes grew over the last steps: an estimate of the spectral radius of the iteration, from
+/// below while changes still fall.
+pub fn growth_rate(residuals: &[Residual]) -> Option<f64> {
+    let last = residuals.len().checked_sub(1)?;
+    let first = last.checked_sub(GROWTH_STEPS)?;
+    let (before, after) = (residuals[first].change, residuals[last].change);
+    (before > 0.0 && after.is_finite()).then(|| (after / before).powf(1.0 / GROWTH_STEPS as f64))
+}
+
+impl Antiradiance {
+    /// Direct light of linked emitters and of the environment, into `linked`.
+    pub(super) fn solve_linked(&mut self, context: &Context) -> Result<(), AntiradianceError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.fill(&self.tables.linked, 0);
+        let has_environment = !self.tables.is_environment_black;
+        if self.emitters.plan.linked_parts == 0 && !has_environment {
+            return Ok(recorder.submit()?);
+        }
+        recorder.scope("linked direct light", |recorder| {
+            self.sources(recorder, true);
+            self.tables.start(recorder, &self.hierarchy, &self.bins, &self.elements, has_environment);
+        });
+        recorder.submit()?;
+        self.settle(context, 0, has_environment, None)?;
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.copy(&self.tables.irradiance, &self.tables.linked);
+        Ok(recorder.submit()?)
+    }
+
+    /// Indirect light of `bounces` bounces after the sources, into `irradiance`.     [Dachsbacher2007 2.2]
+    pub(super) fn solve_indirect(&mut self, context: &Context, bounces: u32) -> Result<(), AntiradianceError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        self.sources(&mut recorder, false);
+        if bounces == 0 {
+            recorder.fill(&self.tables.irradiance, 0);
+            return Ok(recorder.submit()?);
+        }
+        self.tables.start(&mut recorder, &self.hierarchy, &self.bins, &self.elements, false);
+        recorder.submit()?;
+        match self.settings.scheme {
+            Scheme::Symmetric => {
+                for iteration in 1..=self.settings.iterations {
+                    self.step_once(context, iteration, LocalStep { reflects: true, has_environment: false })?;
+                }
+            }
+            Scheme::Asymmetric => {
+                for bounce in 1..=bounces {
+                    // The last of the steps that settle antiradiance is also what the next bounce reflects.
+                    let reflects = (bounce < bounces).then_some(true);
+                    self.settle(context, bounce, false, reflects)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves antiradiance on until it changes no more, light being what it is; then, if asked, reflects.   [Dachsbacher2007 Eq. 14]
+    fn settle(
+        &mut self,
+        context: &Context,
+        bounce: u32,
+        has_environment: bool,
+        reflects: Option<bool>,
+    ) -> Result<(), AntiradianceError> {
+        for _ in 0..self.settings.depth {
+            let residual = self.step_once(context, bounce, LocalStep { reflects: false, has_environment })?;
+            if residual.relative() < f64::from(self.settings.tolerance) {
+                break;
+            }
+        }
+        if reflects == Some(true) {
+            let mut recorder = context.recorder("antiradiance")?;
+            recorder.scope("reflect", |recorder| {
+                self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements);
+            });
+            recorder.submit()?;
+        }
+        Ok(())
+    }
+
+    /// One application of U and what follows; its residual is kept and watched.
+    fn step_once(&mut self, context: &Context, bounce: u32, step: LocalStep) -> Result<Residual, AntiradianceError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.scope(format_args!("bounce {bounce}"), |recorder| {
+            self.tables.step(recorder, &self.transfers, &self.hierarchy, &self.bins, &self.elements, step);
+        });
+        recorder.submit()?;
+        let residual = self.measure(context, bounce, step.reflects)?;
+        self.residuals.push(residual);
+        self.watch()?;
+        Ok(residual)
+    }
+
+    fn measure(&self, context: &Context, bounce: u32, reflects: bool) -> Result<Residual, GpuError> {
+        let leaves = context.download(&self.tables.residuals)?;
+        let sum = |part: fn(&glam::Vec2) -> f32| leaves.iter().map(|leaf| f64::from(part(leaf))).sum::<f64>();
+        let step = self.residuals.last().map_or(0, |last| last.step) + 1;
+        Ok(Residual { step, bounce, reflects, change: sum(|leaf| leaf.x), total: sum(|leaf| leaf.y) })
+    }
+
+    /// Refuses an iteration that grows.
+    fn watch(&self) -> Result<(), AntiradianceError> {
+        let Some(last) = self.residuals.last() else { return Ok(()) };
+        let own = self.residuals.iter().filter(|r| (r.bounce == 0) == (last.bounce == 0));
+        let largest_source = own.map(|r| r.total).next().unwrap_or(0.0);
+        let grew = !last.change.is_finite() || !last.total.is_finite() || last.total > GROWTH_LIMIT * largest_source;
+        if !grew || largest_source == 0.0 {
+            return Ok(());
+        }
+        Err(AntiradianceError::Growth {
+            steps: last.step,
+            rate: growth_rate(&self.residuals).unwrap_or(f64::INFINITY),
+            scheme: match self.settings.scheme {
+                Scheme::Symmetric => "symmetric",
+                Scheme::Asymmetric => "asymmetric",
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn residuals(changes: &[f64]) -> Vec<Residual> {
+        let residual =
+            |(step, &change)| Residual { step: step as u32 + 1, bounce: 1, reflects: true, change, total: 1.0 };
+        changes.iter().enumerate().map(residual).collect()
+    }
+
+    #[test]
+    fn the_growth_rate_is_that_of_a_geometric_series() {
+        let halving: Vec<f64> = (0..8).map(|k| 0.5f64.powi(k)).collect();
+        assert!((growth_rate(&residuals(&halving)).unwrap() - 0.5).abs() < 1e-12);
+        let tripling: Vec<f64> = (0..8).map(|k| 3f64.powi(k)).collect();
+        assert!((growth_rate(&residuals(&tripling)).unwrap() - 3.0).abs() < 1e-12);
+        assert_eq!(growth_rate(&residuals(&halving[..4])), None);
+        assert_eq!(growth_rate(&residuals(&[0.0; 8])), None);
+    }
+}

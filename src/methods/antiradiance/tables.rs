@@ -1,0 +1,217 @@
+//! The light on the hierarchy: tables over nodes and bins, and the passes over them.
+
+use super::linking::Transfers;
+use crate::gpu::shaders::methods::antiradiance as passes;
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::environment::Environment;
+use crate::stages::direction_bins::{DeviceBins, DirectionBins};
+use crate::stages::elements::Elements;
+use crate::stages::hierarchy::Hierarchy;
+use glam::{Vec2, Vec3};
+
+/// Light by node and direction, and by leaf and side. Entry of a table: `node * bins + bin`, [`Tables::words`] words.
+pub struct Tables {
+    pub bin_count: u32,
+    /// Entries are three f16 in two words, else three f32.
+    pub half: bool,
+    /// Intensity per area, radiance times cosine: reflected and emitted light less antiradiance, W m^-2 sr^-1.
+    pub exitant: Buffer<u32>,
+    /// Radiance, W m^-2 sr^-1.
+    pub incident: Buffer<u32>,
+    /// Per bin: radiance of the environment that travels along it.
+    pub environment: Buffer<Vec3>,
+    pub is_environment_black: bool,
+    /// Per leaf: scale of its cosines.
+    pub cosine_norms: Buffer<f32>,
+    /// Two per leaf from here on, front and back, W/m2. Radiosity without transport.
+    pub source: Buffer<Vec3>,
+    pub radiosity: Buffer<Vec3>,
+    /// What arrived last.
+    pub irradiance: Buffer<Vec3>,
+    /// Direct light of linked emitters and of the environment.
+    pub linked: Buffer<Vec3>,
+    /// Per leaf, W: change of the exitant light in the last step, and its sum.
+    pub residuals: Buffer<Vec2>,
+}
+
+/// What a step does beside moving antiradiance on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LocalStep {
+    /// Light is reflected anew, else what was reflected before stays.
+    pub reflects: bool,
+    /// The environment shines on every leaf.
+    pub has_environment: bool,
+}
+
+impl Tables {
+    /// Words of an entry.
+    pub fn words(half: bool) -> u64 {
+        if half { 2 } else { 3 }
+    }
+
+    /// Bytes of one of the two large tables.
+    pub fn table_bytes(node_count: u32, bin_count: u32, half: bool) -> u64 {
+        u64::from(node_count) * u64::from(bin_count) * 4 * Self::words(half)
+    }
+
+    pub fn new(
+        context: &Context,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        environment: &Environment,
+        half: bool,
+    ) -> Result<Self, GpuError> {
+        let bin_count = bins.bins.count();
+        let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 4) as usize;
+        let (leaves, sides) = (hierarchy.leaf_count() as usize, 2 * hierarchy.leaf_count() as usize);
+        Ok(Self {
+            bin_count,
+            half,
+            exitant: context.buffer("antiradiance/exitant", words)?,
+            incident: context.buffer("antiradiance/incident", words)?,
+            environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
+            is_environment_black: environment.is_black(),
+            cosine_norms: context.buffer("antiradiance/cosine norms", leaves)?,
+            source: context.buffer("antiradiance/source", sides)?,
+            radiosity: context.buffer("antiradiance/radiosity", sides)?,
+            irradiance: context.buffer("antiradiance/irradiance", sides)?,
+            linked: context.buffer("antiradiance/linked irradiance", sides)?,
+            residuals: context.buffer("antiradiance/residuals", leaves)?,
+        })
+    }
+
+    /// Follows the leaves' normals.
+    pub fn update_norms(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins) {
+        let leaf_count = hierarchy.leaf_count();
+        let pass = passes::CosineNorms {
+            leaves: &hierarchy.leaves,
+            bin_directions: &bins.directions,
+            cosine_norms: &self.cosine_norms,
+            params: passes::CosineNormsParams { leaf_count, bin_count: self.bin_count },
+        };
+        recorder.dispatch(&pass, leaf_count);
+    }
+
+    /// Starts over: no light has been transported yet, leaves send their sources.
+    pub fn start(
+        &self,
+        recorder: &mut Recorder<'_>,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        elements: &Elements,
+        has_environment: bool,
+    ) {
+        recorder.fill(&self.incident, 0);
+        recorder.fill(&self.exitant, 0);
+        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: false, has_environment });
+    }
+
+    /// One application of U, then K and J: global, push, local, pull.                  [Dachsbacher2007 4.2]
+    pub fn step(
+        &self,
+        recorder: &mut Recorder<'_>,
+        transfers: &Transfers,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        elements: &Elements,
+        step: LocalStep,
+    ) {
+        recorder.scope("global", |recorder| {
+            transfers.gather(recorder, self.bin_count, self.half, &self.exitant, &self.incident);
+        });
+        recorder.scope("push", |recorder| self.push(recorder, hierarchy));
+        self.local(recorder, hierarchy, bins, elements, step);
+    }
+
+    /// Reflects what arrived last; antiradiance stays what it is.
+    pub fn reflect(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, elements: &Elements) {
+        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: true, has_environment: false });
+    }
+
+    fn push(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
+        hierarchy.levels.downwards(recorder, |recorder, level| {
+            if level.start == 0 {
+                return; // the root has no parent
+            }
+            let pass = passes::Push {
+                level_nodes: &hierarchy.levels.nodes,
+                nodes: &hierarchy.nodes,
+                incident: &self.incident,
+                constants: passes::PushConstants { words: Self::words(self.half) as u32 },
+                params: passes::PushParams { first: level.start, count: level.len() as u32, bin_count: self.bin_count },
+            };
+            recorder.dispatch(&pass, level.len() * self.bin_count as usize);
+        });
+    }
+
+    fn local(
+        &self,
+        recorder: &mut Recorder<'_>,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        elements: &Elements,
+        step: LocalStep,
+    ) {
+        let leaf_count = hierarchy.leaf_count();
+        let pass = passes::Local {
+            leaves: &hierarchy.leaves,
+            cosine_norms: &self.cosine_norms,
+            bin_directions: &bins.directions,
+            incident: &self.incident,
+            environment: &self.environment,
+            source: &self.source,
+            albedo: &elements.albedo,
+            radiosity: &self.radiosity,
+            exitant: &self.exitant,
+            irradiance: &self.irradiance,
+            residuals: &self.residuals,
+            constants: passes::LocalConstants { words: Self::words(self.half) as u32 },
+            params: passes::LocalParams {
+                leaf_count,
+                bin_count: self.bin_count,
+                update_radiosity: u32::from(step.reflects),
+                add_environment: u32::from(step.has_environment),
+            },
+        };
+        recorder.scope("local", |recorder| recorder.dispatch(&pass, leaf_count * 64));
+        recorder.scope("pull", |recorder| {
+            hierarchy.levels.upwards(recorder, |recorder, level| {
+                let pass = passes::Pull {
+                    level_nodes: &hierarchy.levels.nodes,
+                    nodes: &hierarchy.nodes,
+                    exitant: &self.exitant,
+                    constants: passes::PullConstants { words: Self::words(self.half) as u32 },
+                    params: passes::PullParams {
+                        first: level.start,
+                        count: level.len() as u32,
+                        bin_count: self.bin_count,
+                    },
+                };
+                recorder.dispatch(&pass, level.len() * self.bin_count as usize);
+            });
+        });
+    }
+}
+
+/// Mean radiance of the environment's light that travels along each bin.
+pub fn binned(environment: &Environment, bins: &DirectionBins) -> Vec<Vec3> {
+    let map = match environment {
+        Environment::Constant(radiance) => return vec![*radiance; bins.count() as usize],
+        Environment::Map(map) => map,
+    };
+    // Samples fine enough that several fall into each bin.
+    let columns = map.width.max(16 * bins.side);
+    let rows = map.height.max(8 * bins.side);
+    let mut sums = vec![(Vec3::ZERO, 0.0f32); bins.count() as usize];
+    for row in 0..rows {
+        let v = (row as f32 + 0.5) / rows as f32;
+        let solid_angle = (std::f32::consts::PI * v).sin();
+        for column in 0..columns {
+            let towards = map.direction_of(Vec2::new((column as f32 + 0.5) / columns as f32, v));
+            let (sum, weight) = &mut sums[bins.bin_of(-towards) as usize];
+            *sum += solid_angle * map.radiance(towards);
+            *weight += solid_angle;
+        }
+    }
+    sums.into_iter().map(|(sum, weight)| if weight > 0.0 { sum / weight } else { Vec3::ZERO }).collect()
+}

@@ -1,0 +1,290 @@
+//! A hierarchy over leaf elements: one leaf per vertex of a mesh, inner nodes of up to four children, depth-first order.
+//!
+//! A leaf stands for both sides of its vertex's cell and sits at the cell's centre of area, so that no two leaves of
+//! neighbouring walls coincide on their common edge. Surfaces are kept apart first: a node above one surface alone holds
+//! the leaves of one wall, as a quadtree where it is flat. The topology is made once ([`HierarchyPlan`]); places, areas
+//! and radii follow the world on the device ([`Hierarchy::place`]).
+
+use super::elements::{BACK_SIDE, Elements, NO_ELEMENT};
+use super::levels::Levels;
+use super::world::World;
+use crate::gpu::shaders::hierarchy as passes;
+use crate::gpu::shaders::types::{HierarchyLeaf, HierarchyNode};
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::surfaces::Surfaces;
+use glam::Vec3;
+
+/// Of [`HierarchyNode::leaf`] and [`HierarchyNode::surface`]; the same constant stands in `lib/hierarchy.glsl`.
+pub const NONE: u32 = u32::MAX;
+/// Of [`HierarchyLeaf::flags`]: light that meets the back is blocked.
+pub const BLOCKS_BEHIND: u32 = 1;
+/// Of [`HierarchyLeaf::flags`]: the back reflects like the front.
+pub const REFLECTS_BEHIND: u32 = 2;
+/// Children of a node, at most.
+pub const MAX_CHILDREN: u32 = 4;
+/// Levels that [`HierarchyPlan::new`] may go down before it halves by count instead of by place.
+const MIDPOINT_LEVELS: u32 = 24;
+
+/// Topology of a hierarchy: plain data.
+#[derive(Debug, Clone, Default)]
+pub struct HierarchyPlan {
+    /// Depth-first; places, radii and areas are still zero.
+    pub nodes: Vec<HierarchyNode>,
+    /// In order of their nodes.
+    pub leaves: Vec<HierarchyLeaf>,
+    /// Of each node; 0 for the root.
+    pub depths: Vec<u32>,
+    /// Leaf of each element, front or back.
+    pub leaf_of_element: Vec<u32>,
+}
+
+/// What is behind surfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Behind {
+    /// Solids are never met from behind; all other surfaces block what meets their backs.
+    BlockOpen,
+    /// Every surface blocks what meets its back.
+    BlockAll,
+    /// Light passes backs, except of double-sided materials.
+    Pass,
+}
+
+impl HierarchyPlan {
+    /// `positions`: world space at rest; `margin(vertex)`: how far the vertex may move from there, metres.
+    pub fn new(
+        elements: &Elements,
+        surfaces: &Surfaces,
+        positions: &[Vec3],
+        behind: Behind,
+        margin: impl Fn(u32) -> f32,
+    ) -> Self {
+        let topology = &elements.topology;
+        let vertices: Vec<u32> = (0..topology.back_elements.len() as u32)
+            .filter(|&vertex| !topology.incident.row(vertex).is_empty())
+            .collect();
+        let mut by_surface: Vec<Vec<u32>> = vec![Vec::new(); surfaces.is_flat.len()];
+        for &vertex in &vertices {
+            by_surface[surfaces.of_vertex[vertex as usize] as usize].push(vertex);
+        }
+        by_surface.retain(|surface| !surface.is_empty());
+        let centers: Vec<Vec3> = by_surface
+            .iter()
+            .map(|surface| surface.iter().map(|&v| positions[v as usize]).sum::<Vec3>() / surface.len() as f32)
+            .collect();
+
+        let mut plan = Self { leaf_of_element: vec![NONE; topology.vertices.len()], ..Self::default() };
+        let mut order: Vec<u32> = (0..by_surface.len() as u32).collect();
+        let mut make = Maker { plan: &mut plan, positions };
+        let mut leaf = |plan: &mut Self, vertex: u32| {
+            let surface = surfaces.of_vertex[vertex as usize];
+            let back_element = topology.back_elements[vertex as usize];
+            let blocks = match behind {
+                Behind::BlockOpen => !surfaces.is_solid[surface as usize],
+                Behind::BlockAll => true,
+                Behind::Pass => false,
+            };
+            let mut flags = if blocks || back_element != NO_ELEMENT { BLOCKS_BEHIND } else { 0 };
+            if back_element != NO_ELEMENT {
+                flags |= REFLECTS_BEHIND;
+            }
+            let node = plan.nodes.last_mut().expect("a leaf is added to its node");
+            node.leaf = plan.leaves.len() as u32;
+            node.surface = if surfaces.is_flat[surface as usize] { surface } else { NONE };
+            node.margin = margin(vertex);
+            plan.leaf_of_element[vertex as usize] = node.leaf;
+            if back_element != NO_ELEMENT {
+                plan.leaf_of_element[back_element as usize] = node.leaf;
+            }
+            debug_assert_eq!(topology.vertices[vertex as usize] & BACK_SIDE, 0);
+            plan.leaves.push(HierarchyLeaf {
+                normal: Vec3::ZERO,
+                area: 0.0,
+                node: plan.nodes.len() as u32 - 1,
+                element: vertex,
+                back_element,
+                flags,
+            });
+        };
+        if !order.is_empty() {
+            make.surfaces(&mut order, &centers, &mut by_surface, (NONE, 0), &mut leaf);
+        }
+        plan.share_upwards();
+        plan
+    }
+
+    /// Inner nodes take over what all their children share.
+    fn share_upwards(&mut self) {
+        for node in (0..self.nodes.len() as u32).rev() {
+            if self.nodes[node as usize].leaf != NONE {
+                continue;
+            }
+            let children: Vec<u32> = self.children(node).collect();
+            let first = self.nodes[children[0] as usize].surface;
+            let same = children.iter().all(|&child| self.nodes[child as usize].surface == first);
+            let margin = children.iter().map(|&child| self.nodes[child as usize].margin).fold(0.0, f32::max);
+            let inner = &mut self.nodes[node as usize];
+            inner.surface = if same { first } else { NONE };
+            inner.margin = margin;
+        }
+    }
+
+    /// Children of a node, in order.
+    pub fn children(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        let (mut next, end) = (node + 1, self.nodes[node as usize].skip);
+        std::iter::from_fn(move || {
+            let child = next;
+            next = self.nodes.get(child as usize)?.skip;
+            (child < end).then_some(child)
+        })
+    }
+
+    /// Levels between the root and the deepest leaf.
+    pub fn depth(&self) -> u32 {
+        self.depths.iter().copied().max().unwrap_or(0)
+    }
+}
+
+/// Builds nodes depth first.
+struct Maker<'a> {
+    plan: &'a mut HierarchyPlan,
+    positions: &'a [Vec3],
+}
+
+impl Maker<'_> {
+    fn open(&mut self, (parent, depth): (u32, u32)) -> u32 {
+        let node = self.plan.nodes.len() as u32;
+        self.plan.nodes.push(HierarchyNode {
+            center: Vec3::ZERO,
+            radius: 0.0,
+            area: 0.0,
+            skip: node + 1,
+            parent,
+            leaf: NONE,
+            surface: NONE,
+            margin: 0.0,
+        });
+        self.plan.depths.push(depth);
+        node
+    }
+
+    fn close(&mut self, node: u32) {
+        self.plan.nodes[node as usize].skip = self.plan.nodes.len() as u32;
+    }
+
+    /// The subtree of several surfaces.
+    fn surfaces(
+        &mut self,
+        order: &mut [u32],
+        centers: &[Vec3],
+        by_surface: &mut [Vec<u32>],
+        above: (u32, u32),
+        leaf: &mut impl FnMut(&mut HierarchyPlan, u32),
+    ) {
+        if let [surface] = *order {
+            let mut vertices = std::mem::take(&mut by_surface[surface as usize]);
+            return self.vertices(&mut vertices, above, leaf);
+        }
+        let node = self.open(above);
+        for part in quarters(order, centers, above.1) {
+            self.surfaces(part, centers, by_surface, (node, above.1 + 1), leaf);
+        }
+        self.close(node);
+    }
+
+    /// The subtree of leaves of one surface.
+    fn vertices(&mut self, vertices: &mut [u32], above: (u32, u32), leaf: &mut impl FnMut(&mut HierarchyPlan, u32)) {
+        let node = self.open(above);
+        if let [vertex] = *vertices {
+            return leaf(self.plan, vertex);
+        }
+        let positions = self.positions;
+        for part in quarters(vertices, positions, above.1) {
+            self.vertices(part, (node, above.1 + 1), leaf);
+        }
+        self.close(node);
+    }
+}
+
+/// Two to four parts of at least two items: halves of halves, each across its longest side.
+fn quarters<'i>(items: &'i mut [u32], centers: &[Vec3], depth: u32) -> Vec<&'i mut [u32]> {
+    let (left, right) = halves(items, centers, depth);
+    let mut parts = Vec::with_capacity(MAX_CHILDREN as usize);
+    for half in [left, right] {
+        if half.len() == 1 {
+            parts.push(half);
+        } else {
+            let (left, right) = halves(half, centers, depth);
+            parts.extend([left, right]);
+        }
+    }
+    parts
+}
+
+/// Cuts at the middle of the longest side of the bounds; by count where that would leave one part all but empty.
+fn halves<'i>(items: &'i mut [u32], centers: &[Vec3], depth: u32) -> (&'i mut [u32], &'i mut [u32]) {
+    let at = |item: u32| centers[item as usize];
+    let (low, high) =
+        items.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), &item| (low.min(at(item)), high.max(at(item))));
+    let axis = (high - low).max_position();
+    let middle = 0.5 * (low[axis] + high[axis]);
+    let count = items.len();
+    items.sort_by(|&a, &b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(&b)));
+    let mut cut = items.partition_point(|&item| at(item)[axis] < middle);
+    if cut < count / 8 || cut > count - count / 8 || cut == 0 || cut == count || depth > MIDPOINT_LEVELS {
+        cut = count / 2;
+    }
+    items.split_at_mut(cut)
+}
+
+/// The hierarchy on the device.
+pub struct Hierarchy {
+    pub plan: HierarchyPlan,
+    pub nodes: Buffer<HierarchyNode>,
+    pub leaves: Buffer<HierarchyLeaf>,
+    pub levels: Levels,
+}
+
+impl Hierarchy {
+    /// Uploads the topology and places it in the present world.
+    pub fn new(context: &Context, plan: HierarchyPlan, elements: &Elements, world: &World) -> Result<Self, GpuError> {
+        let hierarchy = Self {
+            nodes: context.upload("hierarchy/nodes", &plan.nodes)?,
+            leaves: context.upload("hierarchy/leaves", &plan.leaves)?,
+            levels: Levels::new(context, "hierarchy", &plan.depths)?,
+            plan,
+        };
+        let mut recorder = context.recorder("hierarchy")?;
+        hierarchy.place(&mut recorder, elements, world);
+        recorder.submit()?;
+        Ok(hierarchy)
+    }
+
+    pub fn node_count(&self) -> u32 {
+        self.plan.nodes.len() as u32
+    }
+
+    pub fn leaf_count(&self) -> u32 {
+        self.plan.leaves.len() as u32
+    }
+
+    /// Follows the world's vertices: leaves first, then nodes from the leaves up.
+    pub fn place(&self, recorder: &mut Recorder<'_>, elements: &Elements, world: &World) {
+        let leaf_count = self.leaf_count();
+        let pass = passes::PlaceLeaves {
+            positions: &world.positions,
+            normals: &world.normals,
+            triangles: &world.triangles,
+            incident_offsets: &elements.incident_offsets,
+            incident_triangles: &elements.incident_triangles,
+            leaves: &self.leaves,
+            nodes: &self.nodes,
+            params: passes::PlaceLeavesParams { leaf_count },
+        };
+        recorder.dispatch(&pass, leaf_count);
+        self.levels.upwards(recorder, |recorder, level| {
+            let params = passes::PullBoundsParams { first: level.start, count: level.len() as u32 };
+            let pass = passes::PullBounds { level_nodes: &self.levels.nodes, nodes: &self.nodes, params };
+            recorder.dispatch(&pass, level.len());
+        });
+    }
+}
