@@ -153,6 +153,7 @@ impl Method {
                         direct_irradiance: method.direct_irradiance(),
                         indirect_irradiance: method.indirect_irradiance(),
                         back_elements: method.back_elements(),
+                        colors: None,
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
