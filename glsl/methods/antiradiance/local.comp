@@ -3,13 +3,13 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One workgroup per leaf: incident radiance becomes irradiance of both sides, reflected radiance, and antiradiance, which
+// Eight threads per leaf: incident radiance becomes irradiance of both sides, reflected radiance, and antiradiance, which
 // goes on where the light came from, negated.                                       [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
 // reads leaves, cosine_norms, bin_directions, incident[node_count * bin_count], environment[bin_count] (W m^-2 sr^-1),
 //       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count]
 // updates radiosity[2 leaf_count] (W/m2), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
 // writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
-// shared 64 x (irradiance of both sides)
+// shared 64 x (irradiance of both sides, residuals)
 // Differs from [Dachsbacher2007]: one leaf is both sides of a surface; open surfaces take away light from behind as well.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 3;    // of an entry of the tables: 3 (f32) or 2 (f16)
@@ -34,8 +34,9 @@ layout(push_constant, scalar) uniform Params {
 #include "methods/antiradiance/table.glsl"
 
 const float PI = 3.14159265358979;
+const uint LANES = 8;       // threads of a leaf
 shared vec3 sh_front[64], sh_back[64];
-shared float sh_changed[64], sh_present[64];
+shared vec2 sh_residual[64];
 
 vec3 incident_in(uint row, uint bin)
 {
@@ -45,8 +46,10 @@ vec3 incident_in(uint row, uint bin)
 
 void main()
 {
-    uint leaf = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x, thread = gl_LocalInvocationID.x;
-    if (leaf >= params.leaf_count) return;
+    // A thread beyond the last leaf works on the last one, so that all meet at the barriers, and writes nothing.
+    uint thread = gl_LocalInvocationID.x, lane = thread % LANES, first_lane = thread - lane;
+    uint wanted = linear_index() / LANES, leaf = min(wanted, params.leaf_count - 1);
+    bool is_own = wanted < params.leaf_count;
     HierarchyLeaf own = leaves[leaf];
     uint row = own.node * params.bin_count;
     bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0, reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
@@ -54,7 +57,7 @@ void main()
 
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
-    for (uint bin = thread; bin < params.bin_count; bin += 64) {
+    for (uint bin = lane; bin < params.bin_count; bin += LANES) {
         float cosine = dot(own.normal, bin_directions[bin]);
         vec3 arriving = discrete_cosine(cosine, norm, params.bin_count) * bin_solid_angle * incident_in(row, bin);
         if (cosine <= 0.0) front += arriving;
@@ -63,15 +66,12 @@ void main()
     sh_front[thread] = front;
     sh_back[thread] = back;
     barrier();
-    for (uint half_count = 32; half_count > 0; half_count /= 2) {
-        if (thread < half_count) {
-            sh_front[thread] += sh_front[thread + half_count];
-            sh_back[thread] += sh_back[thread + half_count];
-        }
-        barrier();
+    front = vec3(0.0);
+    back = vec3(0.0);
+    for (uint k = 0; k < LANES; ++k) {
+        front += sh_front[first_lane + k];
+        if (reflects_behind) back += sh_back[first_lane + k];
     }
-    front = sh_front[0];
-    back = reflects_behind ? sh_back[0] : vec3(0.0);
 
     vec3 b_front = radiosity[2 * leaf], b_back = radiosity[2 * leaf + 1];
     if (params.update_radiosity != 0) {
@@ -79,33 +79,25 @@ void main()
         b_back = source[2 * leaf + 1] + (reflects_behind ? albedo[own.back_element] * back : vec3(0.0));
     }
 
-    float changed = 0.0, present = 0.0;
-    for (uint bin = thread; bin < params.bin_count; bin += 64) {
+    vec2 residual = vec2(0.0);      // change, sum
+    for (uint bin = lane; bin < params.bin_count; bin += LANES) {
         float cosine = dot(own.normal, bin_directions[bin]);
         bool leaves_front = cosine > 0.0;
         vec3 radiance = (leaves_front ? b_front : b_back) / PI;
         if (!leaves_front || blocks_behind) radiance -= incident_in(row, bin);
         vec3 intensity = discrete_cosine(cosine, norm, params.bin_count) * radiance;
         vec3 change = abs(intensity - LOAD_ENTRY(exitant, row + bin));
-        changed += change.r + change.g + change.b;
-        present += abs(intensity.r) + abs(intensity.g) + abs(intensity.b);
-        STORE_ENTRY(exitant, row + bin, intensity);
+        residual += vec2(change.r + change.g + change.b, abs(intensity.r) + abs(intensity.g) + abs(intensity.b));
+        if (is_own) STORE_ENTRY(exitant, row + bin, intensity);
     }
-    sh_changed[thread] = changed;
-    sh_present[thread] = present;
+    sh_residual[thread] = residual;
     barrier();
-    for (uint half_count = 32; half_count > 0; half_count /= 2) {
-        if (thread < half_count) {
-            sh_changed[thread] += sh_changed[thread + half_count];
-            sh_present[thread] += sh_present[thread + half_count];
-        }
-        barrier();
-    }
-    if (thread == 0) {
-        irradiance[2 * leaf] = front;
-        irradiance[2 * leaf + 1] = back;
-        radiosity[2 * leaf] = b_front;
-        radiosity[2 * leaf + 1] = b_back;
-        residuals[leaf] = own.area * bin_solid_angle * vec2(sh_changed[0], sh_present[0]);
-    }
+    if (lane != 0 || !is_own) return;
+    residual = vec2(0.0);
+    for (uint k = 0; k < LANES; ++k) residual += sh_residual[first_lane + k];
+    irradiance[2 * leaf] = front;
+    irradiance[2 * leaf + 1] = back;
+    radiosity[2 * leaf] = b_front;
+    radiosity[2 * leaf + 1] = b_back;
+    residuals[leaf] = own.area * bin_solid_angle * residual;
 }

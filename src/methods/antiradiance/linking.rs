@@ -10,6 +10,7 @@ use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
 use crate::stages::scan::{self, ScanScratch};
 use glam::UVec2;
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// Pairs of one step of the queue.
 const QUEUE_BATCH: u32 = 8192;
@@ -95,6 +96,9 @@ pub struct TransferWindow {
     /// Sender's entry in a table (node x bins + bin), and the bits of the weight.
     pub transfers: Buffer<UVec2>,
 }
+
+/// Receivers of a window and its place among all transfers.
+type NodesAndTransfers = (Range<u32>, Range<u32>);
 
 /// What all links transfer, by receiver and bin.
 pub struct Transfers {
@@ -203,7 +207,7 @@ impl Transfers {
         context: &Context,
         node_count: u32,
         bin_count: u32,
-    ) -> Result<Vec<(std::ops::Range<u32>, std::ops::Range<u32>)>, LinkingError> {
+    ) -> Result<Vec<NodesAndTransfers>, LinkingError> {
         let largest = context.limits().storage_buffer_bytes / size_of::<UVec2>() as u64;
         if u64::from(self.count) <= largest {
             return Ok(vec![(0..node_count, 0..self.count)]);

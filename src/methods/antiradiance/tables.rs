@@ -9,6 +9,9 @@ use crate::stages::elements::Elements;
 use crate::stages::hierarchy::Hierarchy;
 use glam::{Vec2, Vec3};
 
+/// Threads of a leaf in `local.comp`.
+const LOCAL_LANES: u32 = 8;
+
 /// Light by node and direction, and by leaf and side. Entry of a table: `node * bins + bin`, [`Tables::words`] words.
 pub struct Tables {
     pub bin_count: u32,
@@ -173,7 +176,7 @@ impl Tables {
                 add_environment: u32::from(step.has_environment),
             },
         };
-        recorder.scope("local", |recorder| recorder.dispatch(&pass, leaf_count * 64));
+        recorder.scope("local", |recorder| recorder.dispatch(&pass, leaf_count * LOCAL_LANES));
         recorder.scope("pull", |recorder| {
             hierarchy.levels.upwards(recorder, |recorder, level| {
                 let pass = passes::Pull {
