@@ -80,7 +80,7 @@ impl Method {
                 Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer })))
             }
             "antiradiance" => {
-                let method = Antiradiance::prepare(context, &explicit_stage(stage), request.settings()?);
+                let method = Antiradiance::prepare(context, &explicit_stage(stage, watch), request.settings()?);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
@@ -146,7 +146,7 @@ impl Method {
             }
             Self::Antiradiance(shown) => {
                 let AntiradianceShown { method, shadow_maps, g_buffer } = &mut **shown;
-                method.solve(context, world, request.bounces).map_err(AppError::failed)?;
+                method.solve(context, world, request.bounces, watch).map_err(AppError::failed)?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
                     let light = VertexLight {
@@ -159,7 +159,6 @@ impl Method {
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });
                 recorder.submit()?;
-                progress.advance(u64::from(request.spp));
                 Ok(())
             }
         }

@@ -53,6 +53,7 @@ use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::emitters::{EmitterChoice, Emitters};
 use crate::stages::hierarchy::{Behind, Hierarchy, HierarchyPlan};
 use crate::stages::punctual;
+use crate::stages::work::{Interrupted, Watch};
 use crate::stages::world::World;
 use glam::Vec3;
 
@@ -121,6 +122,8 @@ pub enum AntiradianceError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Linking(#[from] LinkingError),
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     #[error(
         "antiradiance: {what} of {nodes} nodes and {bins} bins needs {needed} bytes, {available} are available; lower \
          bins or --elements{}", if *.half { "" } else { ", or set half_tables=true" }
@@ -276,13 +279,19 @@ impl Antiradiance {
     }
 
     /// The light of direct illumination and `bounces` more.                                 [Dachsbacher2007 4.2]
-    pub fn solve(&mut self, context: &Context, world: &World, bounces: u32) -> Result<(), AntiradianceError> {
+    pub fn solve(
+        &mut self,
+        context: &Context,
+        world: &World,
+        bounces: u32,
+        watch: &dyn Watch,
+    ) -> Result<(), AntiradianceError> {
         self.residuals.clear();
-        self.solve_linked(context)?;
+        self.solve_linked(context, watch)?;
         let mut recorder = context.recorder("antiradiance")?;
         recorder.scope("direct", |recorder| self.direct_light(recorder, world));
         recorder.submit()?;
-        self.solve_indirect(context, bounces)?;
+        self.solve_indirect(context, bounces, watch)?;
 
         let mut recorder = context.recorder("antiradiance")?;
         recorder.scope("to elements", |recorder| {

@@ -3,6 +3,7 @@
 use super::tables::LocalStep;
 use super::{Antiradiance, AntiradianceError, Scheme};
 use crate::gpu::{Context, GpuError};
+use crate::stages::work::Watch;
 use serde::Serialize;
 
 /// Change of the exitant light, of the most there was, beyond which an iteration is said to grow.
@@ -43,7 +44,7 @@ pub fn growth_rate(residuals: &[Residual]) -> Option<f64> {
 
 impl Antiradiance {
     /// Direct light of linked emitters and of the environment, into `linked`.
-    pub(super) fn solve_linked(&mut self, context: &Context) -> Result<(), AntiradianceError> {
+    pub(super) fn solve_linked(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         recorder.fill(&self.tables.linked, 0);
         let has_environment = !self.tables.is_environment_black;
@@ -55,6 +56,7 @@ impl Antiradiance {
             self.tables.start(recorder, &self.hierarchy, &self.bins, &self.elements, has_environment);
         });
         recorder.submit()?;
+        watch.step("antiradiance, direct light", 0, 1)?;
         self.settle(context, 0, has_environment, None)?;
         let mut recorder = context.recorder("antiradiance")?;
         recorder.copy(&self.tables.irradiance, &self.tables.linked);
@@ -62,7 +64,12 @@ impl Antiradiance {
     }
 
     /// Indirect light of `bounces` bounces after the sources, into `irradiance`.     [Dachsbacher2007 2.2]
-    pub(super) fn solve_indirect(&mut self, context: &Context, bounces: u32) -> Result<(), AntiradianceError> {
+    pub(super) fn solve_indirect(
+        &mut self,
+        context: &Context,
+        bounces: u32,
+        watch: &dyn Watch,
+    ) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         self.sources(&mut recorder, false);
         if bounces == 0 {
@@ -74,11 +81,13 @@ impl Antiradiance {
         match self.settings.scheme {
             Scheme::Symmetric => {
                 for iteration in 1..=self.settings.iterations {
+                    watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
                     self.step_once(context, iteration, LocalStep { reflects: true, has_environment: false })?;
                 }
             }
             Scheme::Asymmetric => {
                 for bounce in 1..=bounces {
+                    watch.step("antiradiance", u64::from(bounce) - 1, bounces.into())?;
                     // The last of the steps that settle antiradiance is also what the next bounce reflects.
                     let reflects = (bounce < bounces).then_some(true);
                     self.settle(context, bounce, false, reflects)?;
