@@ -127,7 +127,7 @@ pub struct RenderArgs {
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u32,
-    /// A setting of the method, see `linklight methods`; may be repeated
+    /// A setting of the method or of the display, see `linklight methods`; may be repeated
     #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
     pub set: Vec<Assignment>,
     /// Extra channels of an .exr, separated by commas
@@ -145,11 +145,14 @@ pub struct RenderArgs {
 }
 
 /// Display stages.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Display {
     /// Interpolate the solution between vertices
     #[default]
     Vertex,
+    /// Gather from the solution at every pixel, with visibility
+    FinalGather,
 }
 
 /// Ways to cast rays.

@@ -1,9 +1,11 @@
 //! The frame: from a staged scene to a film, by the method that was asked for.
 
 use super::AppError;
-use super::cli::Channel;
+use super::cli::{Channel, Display};
 use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
+use crate::display::direct::Sample;
+use crate::display::final_gather::{FinalGather, Gathered};
 use crate::display::g_buffer::GBuffer;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::vertex::{self, VertexLight};
@@ -13,6 +15,7 @@ use crate::methods::explicit_visibility::{self, ExplicitVisibility};
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
 use crate::stages::film::Film;
+use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
@@ -34,6 +37,13 @@ pub struct VertexShown {
     method: ExplicitVisibility,
     shadow_maps: ShadowMaps,
     g_buffer: GBuffer,
+    gather: Option<Gather>,
+}
+
+/// The final gather, and the tree that the method's vertices fill.
+struct Gather {
+    leaves: VertexLeaves,
+    display: FinalGather,
 }
 
 /// What a method sees of a staged scene.
@@ -77,7 +87,11 @@ impl Method {
                 tracing::info!("{}", method.report());
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
                 let g_buffer = GBuffer::new(context, request.width, request.height)?;
-                Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer })))
+                let gather = match request.display {
+                    Some(Display::FinalGather) => Some(Gather::new(context, request, stage, &method)?),
+                    _ => None,
+                };
+                Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
             }
             "antiradiance" => {
                 let method = Antiradiance::prepare(context, &explicit_stage(stage, watch), request.settings()?);
@@ -128,7 +142,10 @@ impl Method {
                 Ok(())
             }
             Self::ExplicitVisibility(shown) => {
-                let VertexShown { method, shadow_maps, g_buffer } = &**shown;
+                let VertexShown { method, shadow_maps, g_buffer, gather } = &**shown;
+                if let Some(gather) = gather {
+                    return gather.frame(context, request, stage, shown, film, watch);
+                }
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("explicit-visibility", |recorder| method.solve(recorder, world, request.bounces));
                 recorder.scope("display", |recorder| {
@@ -162,6 +179,72 @@ impl Method {
                 Ok(())
             }
         }
+    }
+}
+
+impl Gather {
+    fn new(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        method: &ExplicitVisibility,
+    ) -> Result<Self, AppError> {
+        let settings = request.final_gather_settings()?;
+        let positions = context.download(&stage.world.positions)?;
+        let back_elements = &method.elements().topology.back_elements;
+        let options = settings.tree_options();
+        let leaves = VertexLeaves::new(context, &positions, &stage.geometry.triangles, back_elements, options)
+            .map_err(AppError::failed)?;
+        let display = FinalGather::new(context, [request.width, request.height], settings, request.tone, request.seed)?;
+        Ok(Self { leaves, display })
+    }
+
+    /// Solves all bounces but the one that the gather adds, and gathers sample by sample: each is a submission, so that
+    /// the user can interrupt between them.
+    #[expect(clippy::too_many_arguments, reason = "everything a frame is made of, each by its own type")]
+    fn frame(
+        &self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        shown: &VertexShown,
+        film: &Film,
+        watch: &dyn Watch,
+    ) -> Result<(), AppError> {
+        let (method, world) = (&shown.method, &stage.world);
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("explicit-visibility", |recorder| {
+            method.solve(recorder, world, request.bounces.saturating_sub(1));
+            let elements = VertexElements {
+                emission: &method.elements().emission,
+                albedo: &method.elements().albedo,
+                punctual: method.punctual_irradiance(),
+                direct: method.direct_irradiance(),
+                indirect: method.indirect_irradiance(),
+            };
+            self.leaves.fill(recorder, elements, request.bounces > 0);
+        });
+        recorder.scope("display", |recorder| shown.shadow_maps.draw(recorder, world, &stage.pose, stage.bounds));
+        recorder.submit()?;
+        let gathered = Gathered {
+            world,
+            tree: &self.leaves.tree,
+            tracer: stage.tracer(),
+            shadow_maps: &shown.shadow_maps,
+            g_buffer: &shown.g_buffer,
+            view: &stage.view,
+        };
+        for index in 0..request.spp {
+            watch.step("final gather", index.into(), request.spp.into())?;
+            let mut recorder = context.recorder("frame")?;
+            recorder.scope("display", |recorder| {
+                self.display.draw(recorder, gathered, Sample { index, samples: request.spp, is_unlit: false }, film);
+            });
+            recorder.submit()?;
+        }
+        watch.step("final gather", request.spp.into(), request.spp.into())?;
+        tracing::info!("{}", self.display.report(context)?);
+        Ok(())
     }
 }
 

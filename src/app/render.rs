@@ -12,6 +12,7 @@ use super::output::Measured;
 use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
 use super::{AppError, frame, output};
+use crate::display::final_gather;
 use crate::gpu::{Capture, Context, Options, prepare_capture};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
@@ -58,11 +59,22 @@ pub struct RenderRequest {
     pub seed: u32,
     /// Checked: [`RenderRequest::settings`] of the method's own type succeeds.
     pub assignments: Vec<Assignment>,
+    /// Those of the display stage, checked.
+    pub display_assignments: Vec<Assignment>,
     /// Each at most once, in order of declaration.
     pub channels: Vec<Channel>,
     pub profile: Option<PathBuf>,
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
+}
+
+/// Those that the display stage declares, and the others, which the method must know.
+fn split_assignments(display: Option<Display>, all: Vec<Assignment>) -> (Vec<Assignment>, Vec<Assignment>) {
+    let specs = match display {
+        Some(Display::FinalGather) => final_gather::Settings::specs(),
+        _ => Vec::new(),
+    };
+    all.into_iter().partition(|assignment| specs.iter().any(|spec| spec.name == assignment.key))
 }
 
 /// Which light is shown.
@@ -91,7 +103,10 @@ impl TryFrom<RenderArgs> for RenderRequest {
         if args.indirect_only && args.bounces == 0 {
             return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
         }
-        args.method.record(&args.set)?;
+        let display = (!path_traced).then(|| args.display.unwrap_or_default());
+        let (of_display, of_method) = split_assignments(display, args.set);
+        args.method.record(&of_method)?;
+        final_gather::Settings::from_assignments(&of_display)?;
 
         let mut written = vec![&args.output.path];
         written.extend([&args.profile, &args.trace, &args.capture].into_iter().flatten());
@@ -113,7 +128,7 @@ impl TryFrom<RenderArgs> for RenderRequest {
             scene: args.scene,
             output: args.output,
             method: args.method,
-            display: (!path_traced).then(|| args.display.unwrap_or_default()),
+            display,
             bounces: args.bounces,
             width: args.size.0,
             height: args.size.1,
@@ -132,7 +147,8 @@ impl TryFrom<RenderArgs> for RenderRequest {
             tone: ToneSettings { operator: args.tonemap, exposure: args.exposure, ..ToneSettings::default() },
             rays: args.rays,
             seed: args.seed,
-            assignments: args.set,
+            assignments: of_method,
+            display_assignments: of_display,
             channels,
             profile: args.profile,
             trace: args.trace,
@@ -145,6 +161,11 @@ impl RenderRequest {
     /// The method's settings, typed; `S` must be the `Settings` of [`Self::method`].
     pub fn settings<S: SettingGroup>(&self) -> Result<S, AppError> {
         Ok(S::from_assignments(&self.assignments)?)
+    }
+
+    /// The settings of the per-pixel final gather.
+    pub fn final_gather_settings(&self) -> Result<final_gather::Settings, AppError> {
+        Ok(SettingGroup::from_assignments(&self.display_assignments)?)
     }
 
     /// Everything that decides the picture, by name: recorded in pictures, profiles and traces.
@@ -168,8 +189,11 @@ impl RenderRequest {
         insert("elements", json!(self.elements));
         insert("rays", serde_json::to_value(self.rays)?);
         insert("seed", self.seed.into());
-        if let Some(Display::Vertex) = self.display {
-            insert("display", "vertex".into());
+        if let Some(display) = self.display {
+            insert("display", serde_json::to_value(display)?);
+        }
+        if self.display == Some(Display::FinalGather) {
+            insert("display_settings", self.final_gather_settings()?.record().into());
         }
         insert("spp", self.spp.into());
         if self.output.format == Format::Png {

@@ -5,12 +5,16 @@
 //! | [`shadow_maps`] | reversed depth of every view of every punctual light |
 //! | [`g_buffer`] | which triangle each pixel sees, and the surface there |
 //! | [`false_color`] | debug views: palettes, and the element under a pixel |
+//! | [`direct`] | what every display stage starts from: background, emission, punctual light |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
+//! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
 //!
 //! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
 //! comes after, in [`crate::report::tonemap`].
 
+pub mod direct;
 pub mod false_color;
+pub mod final_gather;
 pub mod g_buffer;
 pub mod shadow_maps;
 pub mod vertex;

@@ -1,10 +1,11 @@
 //! Vertex display: punctual light per pixel by shadow maps, all other light interpolated between vertices.
 
+use super::direct::{self, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
 use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display::{Vertex, VertexParams};
-use crate::gpu::{Buffer, Recorder, Sampled};
+use crate::gpu::{Buffer, Recorder};
 use crate::scene::camera::View;
 use crate::stages::film::Film;
 use crate::stages::world::World;
@@ -39,7 +40,7 @@ pub fn draw(
     for sample in 0..samples {
         let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
         recorder.scope("sample", |recorder| {
-            g_buffer.draw(recorder, world, &pixel_view);
+            direct::draw(recorder, world, shadow_maps, g_buffer, &pixel_view, Sample { index: sample, samples, is_unlit: light.colors.is_some() }, film);
             let pass = Vertex {
                 visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
                 g_position: g_buffer.sampled(&g_buffer.position),
@@ -52,25 +53,11 @@ pub fn draw(
                 direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
                 indirect_irradiance: light.indirect_irradiance,
                 back_elements: light.back_elements,
-                lights: &world.lights,
-                shadow_lights: &shadow_maps.lights,
-                shadow_views: &shadow_maps.views,
-                shadow_maps: Sampled { image: &shadow_maps.depth, sampler: &shadow_maps.sampler },
-                environment_info: &world.environment.info_buffer,
-                environment_map: Sampled { image: &world.environment.map, sampler: &world.environment.sampler },
                 direct: &film.direct,
                 indirect: &film.indirect,
-                albedo: &film.albedo,
-                normal: &film.normal,
-                depth: &film.depth,
                 params: VertexParams {
-                    clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(),
                     eye: pixel_view.eye,
-                    forward: pixel_view.forward,
-                    eye_along: pixel_view.eye_along,
-                    light_count: world.light_count,
                     weight: 1.0 / samples as f32,
-                    is_first: u32::from(sample == 0),
                     shows_colors: u32::from(light.colors.is_some()),
                 },
             };

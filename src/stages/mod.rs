@@ -13,6 +13,7 @@ pub mod links;
 pub mod pair_queue;
 pub mod punctual;
 pub mod scan;
+pub mod sender_tree;
 pub mod trace;
 pub mod view;
 pub mod work;

@@ -1,0 +1,236 @@
+#ifndef DISPLAY_FINAL_GATHER
+#define DISPLAY_FINAL_GATHER
+// The final gather of one pixel: a cut through the sender tree is found, and each of its nodes gathered, in one walk.
+//                                                                                              [Ritschel2008 4.4]
+// The kernel that includes this says how it sees:
+//     float visibility(vec3 origin, vec3 target, uint leaf)      share of the way that is free, 0..1
+// Bindings 0 to 6 and set 1 are the kernel's.
+#include "lib/environment_sampling.glsl"
+#include "lib/offset.glsl"
+#include "lib/polygon.glsl"
+#include "lib/random.glsl"
+#include "lib/receiver.glsl"
+#include "lib/sender_walk.glsl"
+#include "lib/tone_curve.glsl"
+
+// Of a pixel, means over its samples.
+struct GatherCount {
+    float cut_size;     // nodes gathered from
+    float visited;      // nodes looked at
+    vec3 lost;          // radiance that clamping took, W m^-2 sr^-1
+};
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 7) uniform usampler2D visible_triangles;
+layout(set = 0, binding = 8) uniform sampler2D g_position;
+layout(set = 0, binding = 9) uniform sampler2D g_normal;
+layout(set = 0, binding = 10) uniform sampler2D g_albedo;
+layout(set = 0, binding = 11) uniform sampler2D g_specular;
+layout(set = 0, binding = 12) uniform sampler2D g_emission;
+layout(set = 0, binding = 13) uniform usamplerBuffer sender_nodes;      // SENDER_NODE_TEXELS each
+layout(set = 0, binding = 14) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
+layout(set = 0, binding = 15, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
+layout(set = 0, binding = 17, scalar) readonly buffer Adaptation { float adaptation[]; };
+layout(set = 0, binding = 18, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 19, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
+layout(set = 0, binding = 20) uniform sampler2D environment_map;
+layout(set = 0, binding = 21, scalar) readonly buffer EnvironmentCells { EnvironmentCell environment_cells[]; };
+layout(set = 0, binding = 22, scalar) buffer Direct { vec3 direct[]; };
+layout(set = 0, binding = 23, scalar) buffer Indirect { vec3 indirect[]; };
+layout(set = 0, binding = 24, scalar) buffer GatherCounts { GatherCount gather_counts[]; };
+// eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
+layout(push_constant, scalar) uniform Params {
+    vec4 eye;
+    float weight;
+    uint sample_index;
+    uint seed;
+    uint node_count;
+    float threshold;            // of what the display shows, 0..1
+    float exposure;             // factor on radiance after adaptation
+    float key;                  // scaled luminance that the adaptation stands for; 0: radiance as it is
+    float white;
+    uint operator;
+    float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
+    uint jitter;
+    uint environment_samples;
+} params;
+
+uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
+uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
+vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
+EnvironmentCell environment_cell(uint index) { return environment_cells[index]; }
+
+// Leaves nearer than this many of their radii are measured as polygons, farther ones as points: off by 1 % at most.
+const float NEAR_RADII = 5.0;
+
+Receiver receiver;
+float scale;            // from radiance to what the tone curve takes
+float shown;            // what the pixel shows so far, as the display encodes it
+float shown_luminance;
+
+float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }
+
+// Refine where all of the node's light, gone wrong, would show.                                 [Ritschel2008 4.3]
+// Differs from [Ritschel2008]: on top of what the pixel shows already, where the curve is flatter than at black.
+uint sender_decision(SenderNode node, bool is_leaf)
+{
+    float bound = largest_radiance(node, receiver);
+    if (bound <= 0.0) return SENDER_IGNORE;
+    if (is_leaf) return SENDER_TAKE;
+    float change = display_value(scale * (shown_luminance + bound), params.operator, params.white) - shown;
+    return change > params.threshold ? SENDER_REFINE : SENDER_TAKE;
+}
+
+// One ray's worth of light: what the eye sees of it if nothing is in between.
+struct Arrival {
+    vec3 direct;        // W m^-2 sr^-1: emitted by the sender itself
+    vec3 indirect;
+    vec3 lost;          // what clamping took from both
+    vec3 target;
+    uint leaf;
+};
+
+// The light of a node of the cut, by a leaf that is drawn from it, or by its representative.
+Arrival arrival_of(uint node, uvec4 random)
+{
+    vec4 u = vec4(0.5);
+    if (params.jitter != 0) u = fract(unit_interval(random) + float(params.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.0));
+    uint slot;
+    vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
+    if (params.jitter != 0) {
+        uint drawn = draw_leaf(node, u.z);
+        slot = sender_leaf(drawn);
+        float share = sender_weight(drawn);
+        float by = share > 0.0 ? sender_weight(node) / share : 0.0;
+        emitted = by * leaf_light[slot].emitted;
+        reflected = by * leaf_light[slot].reflected;
+    } else {
+        slot = sender_leaf(node);
+        float area = leaf_area(leaves[slot]);
+        emitted = sender_emitted_power(node) / area;
+        reflected = uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * node).xyz) / area - emitted;
+    }
+
+    Arrival none = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), slot);
+    SenderLeaf leaf = leaves[slot];
+    vec3 sender_normal = leaf_normal(leaf);
+    vec3 target = params.jitter != 0 ? leaf_point(leaf, u.xy) : leaf.centre;
+    vec3 to_target = target - receiver.position;
+    if (dot(sender_normal, to_target) >= 0.0) return none;
+
+    vec3 normal = receiver.surface.normal;
+    float squared = dot(to_target, to_target);
+    float radius_squared = max(dot(leaf.edge_u, leaf.edge_u), dot(leaf.edge_v, leaf.edge_v));
+    float cos_receiver = dot(normal, to_target), cos_sender = -dot(sender_normal, to_target);
+    float form_factor = max(cos_receiver, 0.0) * cos_sender * leaf_area(leaf) / (PI * squared * squared);
+    float exact = form_factor;
+    if (squared < NEAR_RADII * NEAR_RADII * radius_squared) {
+        vec3 corners[4];
+        uint count = leaf_corners(leaf, corners);
+        for (uint k = 0; k < 4; ++k) corners[k] -= receiver.position;
+        SeenPolygon seen = seen_polygon(corners, count, normal);
+        exact = seen.form_factor;
+        // Of a leaf that the horizon cuts, the part above it sends.
+        if (cos_receiver <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) {
+            to_target = seen.middle;
+            target = receiver.position + to_target;
+            squared = dot(to_target, to_target);
+            form_factor = exact;
+        }
+    }
+    if (params.clamp_radii > 0.0)
+        form_factor = min(form_factor * min(squared / (params.clamp_radii * params.clamp_radii * radius_squared), 1.0), exact);
+    else
+        form_factor = exact;
+    if (exact <= 0.0 || squared <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) return none;
+
+    vec3 reflectance = brdf_value(receiver.surface, receiver.to_eye, to_target / sqrt(squared));
+    vec3 lost = (exact - form_factor) * reflectance * (emitted + reflected);
+        vec3 size = abs(target);
+    // Ends before the leaf's own surface.
+    target += max(size.x, max(size.y, size.z)) * (1.0 / 524288.0) * sender_normal;
+    return Arrival(form_factor * reflectance * emitted, form_factor * reflectance * reflected, lost, target, slot);
+}
+
+// One of the environment's directions.
+Arrival environment_arrival(uvec4 random, float share)
+{
+    EnvironmentInfo env = environment_info[0];
+    vec4 u = fract(unit_interval(random) + float(params.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.3247180));
+    float density;
+    vec3 direction;
+    if (env.width == 0) {
+        direction = basis_of(receiver.surface.normal) * cosine_hemisphere(u.xy);
+        density = max(dot(receiver.surface.normal, direction), 1e-6) / PI;
+    } else {
+        direction = environment_sample(env, u.xy, u.zw, density);
+    }
+    float cosine = dot(receiver.surface.normal, direction);
+    vec3 light = vec3(0.0);
+    if (cosine > 0.0 && dot(receiver.geometric, direction) > 0.0 && density > 0.0)
+        light = brdf_value(receiver.surface, receiver.to_eye, direction) * environment_radiance(env, direction) * (cosine / density * share);
+    return Arrival(light, vec3(0.0), vec3(0.0), receiver.position + 1e6 * direction, NO_SENDER);
+}
+
+void gather(ivec2 pixel, uint index, uvec3 corners)
+{
+    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
+    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
+    vec3 a = positions[corners.x], b = positions[corners.y], c = positions[corners.z];
+    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
+    vec3 geometric = normalize(cross(b - a, c - a));
+    if (dot(geometric, to_eye) < 0.0) geometric = -geometric;
+    receiver = Receiver(position.xyz, geometric, to_eye, Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, vec3(0.0), n.xyz, true));
+    vec3 origin = position.xyz + offset_length(a, b, c) * geometric;
+
+    // What the pixel shows before this gather: the mean of its samples so far, this one's direct light included.
+    scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
+    float samples_so_far = params.weight * float(params.sample_index + 1);
+    shown_luminance = luminance(direct[index] + indirect[index]) / samples_so_far;
+    shown = display_value(scale * shown_luminance, params.operator, params.white);
+
+    vec3 direct_sum = vec3(0.0), indirect_sum = vec3(0.0), lost_sum = vec3(0.0);
+    uint node = 0, visited = 0, cut = 0, environment_taken = 0;
+    while (true) {
+        // Up to the next arrival that would bring light.
+        Arrival arrival;
+        bool found = false;
+        while (!found && node < params.node_count) {
+            uint taken = next_sender(node, params.node_count, visited);
+            if (taken == NO_SENDER) break;
+            ++cut;
+            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)));
+            found = arrival.direct + arrival.indirect + arrival.lost != vec3(0.0);
+        }
+        while (!found && environment_taken < params.environment_samples) {
+            arrival = environment_arrival(pcg4d(uvec4(index, environment_taken++, 1u, params.seed)), 1.0 / float(params.environment_samples));
+            found = arrival.direct != vec3(0.0);
+        }
+        if (!found) break;
+        float free = visibility(origin, arrival.target, arrival.leaf);
+        direct_sum += free * arrival.direct;
+        indirect_sum += free * arrival.indirect;
+        lost_sum += free * arrival.lost;
+        shown_luminance += free * luminance(arrival.direct + arrival.indirect);
+        shown = display_value(scale * shown_luminance, params.operator, params.white);
+    }
+    direct[index] += params.weight * direct_sum;
+    indirect[index] += params.weight * indirect_sum;
+    gather_counts[index].cut_size += params.weight * float(cut);
+    gather_counts[index].visited += params.weight * float(visited);
+    gather_counts[index].lost += params.weight * lost_sum;
+}
+
+void gather_pixel()
+{
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = textureSize(visible_triangles, 0);
+    if (any(greaterThanEqual(pixel, size))) return;
+    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
+    if (params.sample_index == 0) gather_counts[index] = GatherCount(0.0, 0.0, vec3(0.0));
+    uint seen = texelFetch(visible_triangles, pixel, 0).x;
+    if (seen == 0 || texelFetch(g_emission, pixel, 0).w <= 0.5) return;
+    gather(pixel, index, triangles[seen - 1]);
+}
+#endif

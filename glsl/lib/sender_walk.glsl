@@ -1,0 +1,54 @@
+#ifndef LIB_SENDER_WALK
+#define LIB_SENDER_WALK
+// The one walk over the sender tree: refine and gather in one, without a stack.                 [Ritschel2008 Fig. 10]
+//
+// Bridges, beside the tables of lib/sender_tree.glsl:
+//     uint sender_decision(SenderNode node, bool is_leaf)      what to do with the node
+#include "lib/sender_pack.glsl"
+
+const uint SENDER_IGNORE = 0u;  // it sends nothing here: go on behind its subtree
+const uint SENDER_TAKE = 1u;    // good enough: it belongs to the cut
+const uint SENDER_REFINE = 2u;  // look at its children; a leaf is taken
+
+uint sender_decision(SenderNode node, bool is_leaf);
+
+// The next node of the cut at or after `node`, or NO_SENDER; moves `node` behind it. Ends for any table: every step
+// goes to a larger index.
+uint next_sender(inout uint node, uint node_count, inout uint visited)
+{
+    while (node < node_count) {
+        SenderNode sender = sender_node(node);
+        uint index = node;
+        uint decision = sender_decision(sender, sender.skip == index + 1);
+        bool refine = decision == SENDER_REFINE && sender.skip != index + 1;
+        node = refine ? index + 1 : max(sender.skip, index + 1);
+        ++visited;
+        if (decision != SENDER_IGNORE && !refine) return index;
+    }
+    return NO_SENDER;
+}
+
+// A leaf below `node`, drawn in proportion to the power of the leaves; `u` in 0..1 is used up and left as new.
+uint draw_leaf(uint node, inout float u)
+{
+    float power = sender_weight(node);
+    uint skip = sender_skip(node);
+    while (skip != node + 1) {
+        uint right = sender_skip(node + 1);
+        float left_power = sender_weight(node + 1);
+        float share = power > 0.0 ? clamp(left_power / power, 0.0, 1.0) : 0.5;
+        if (u < share) {
+            u /= share;
+            skip = right;
+            ++node;
+            power = left_power;
+        } else {
+            u = (u - share) / (1.0 - share);
+            node = right;
+            power = sender_weight(node);
+        }
+        u = min(u, 0.99999994);
+    }
+    return node;
+}
+#endif

@@ -1,0 +1,233 @@
+//! Per-pixel final gather: every pixel finds its own cut through a sender tree and gathers from it, with visibility.
+//!
+//! It shows the solution of any method that fills a [`SenderTree`]; the light it adds is one bounce, so a method solves
+//! one bounce less than it is asked for. Senders near the pixel are measured exactly, as polygons, so that nothing has
+//! to be clamped; the leaves of a node and the points on them are drawn by chance, anew in every sample, so that a
+//! picture of many samples has no trace of the tree.
+//!
+//! Differs from [Ritschel2008]: a compute pass stands for the fragment shader, since the film is a set of buffers.
+//!
+//! [Ritschel2008]: crate::methods::PAPERS
+
+use super::direct::{self, Sample};
+use super::g_buffer::GBuffer;
+use super::shadow_maps::ShadowMaps;
+use super::{PixelView, sample_offset};
+use crate::gpu::shaders::display as passes;
+use crate::gpu::shaders::types::GatherCount;
+use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
+use crate::report::tonemap::{Operator, ToneSettings};
+use crate::scene::camera::View;
+use crate::stages::film::Film;
+use crate::stages::sender_tree::{Representative, SenderTree, TreeOptions};
+use crate::stages::trace::Tracer;
+use crate::stages::world::World;
+use glam::{UVec2, Vec3};
+
+crate::choice! {
+    /// What decides whether a sender is seen.
+    pub enum Visibility {
+        /// Rays, as `--rays` says
+        Rays = "rays",
+        /// Nothing: all are seen
+        None = "none",
+    }
+}
+
+crate::settings! {
+    /// What `--display final-gather` lets the user choose.
+    pub struct Settings {
+        /// A node is opened where its light, gone wrong, would change what is shown by more than this.
+        gather_threshold: f32 = 0.01, range 0.0..=1.0, unit "of white", paper "user-defined";
+        /// What decides whether a sender is seen.
+        gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
+        /// Draw leaves, and points on them, by chance and anew in every sample.
+        gather_jitter: bool = true, paper "for glossy surfaces";
+        /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
+        gather_clamp: f32 = 0.0, range 0.0..=100.0, unit "radii", paper "clamped, distance not given";
+        /// Rays to the environment of every sample of a pixel.
+        environment_samples: u32 = 16, range 1..=1024, unit "rays", paper "not given";
+        /// Which leaf stands for an inner node without jitter.
+        representative: Representative = Representative::Intensity, paper "not given";
+        /// How much a difference of normals counts beside distance when the tree is cut.
+        normal_weight: f32 = 0.25, range 0.0..=10.0, paper "0: by position alone";
+    }
+}
+
+impl Settings {
+    /// How a tree for this display is built.
+    pub fn tree_options(&self) -> TreeOptions {
+        TreeOptions { normal_weight: self.normal_weight, representative: self.representative }
+    }
+}
+
+/// What the gather needs beside the tree: how it is told what a change is worth, and its counts.
+pub struct FinalGather {
+    pub settings: Settings,
+    tone: ToneSettings,
+    seed: u32,
+    /// One per pixel, row by row; means over the samples.
+    pub counts: Buffer<GatherCount>,
+}
+
+/// Means over all pixels that gathered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GatherReport {
+    pub pixels: u64,
+    /// Nodes gathered from, per pixel and sample.
+    pub mean_cut: f64,
+    pub largest_cut: f32,
+    /// Nodes looked at.
+    pub mean_visited: f64,
+    /// Radiance that clamping took, mean over the picture, W m^-2 sr^-1.
+    pub lost: Vec3,
+}
+
+impl std::fmt::Display for GatherReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "final gather: {} pixels, cut {:.1} nodes in the mean and {:.0} at most, {:.1} nodes visited",
+            self.pixels, self.mean_cut, self.largest_cut, self.mean_visited
+        )?;
+        if self.lost != Vec3::ZERO {
+            write!(f, "; clamping took {:.3e} W/(m2 sr) in the mean", self.lost.element_sum() / 3.0)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a picture is gathered from.
+#[derive(Clone, Copy)]
+pub struct Gathered<'a> {
+    pub world: &'a World,
+    pub tree: &'a SenderTree,
+    pub tracer: Tracer<'a>,
+    pub shadow_maps: &'a ShadowMaps,
+    pub g_buffer: &'a GBuffer,
+    pub view: &'a View,
+}
+
+impl FinalGather {
+    /// `tone` is what the picture will be shown with: it says where errors show.
+    pub fn new(
+        context: &Context,
+        [width, height]: [u32; 2],
+        settings: Settings,
+        tone: ToneSettings,
+        seed: u32,
+    ) -> Result<Self, GpuError> {
+        let counts = context.buffer("final_gather/counts", width as usize * height as usize)?;
+        Ok(Self { settings, tone, seed, counts })
+    }
+
+    /// Adds sample `sample` to `film`; the first clears it.
+    pub fn draw(&self, recorder: &mut Recorder<'_>, from: Gathered<'_>, sample: Sample, film: &Film) {
+        let size = UVec2::new(film.width, film.height);
+        let pixel_view = PixelView::new(from.view, size, sample_offset(sample.index, sample.samples));
+        recorder.scope("sample", |recorder| {
+            direct::draw(recorder, from.world, from.shadow_maps, from.g_buffer, &pixel_view, sample, film);
+            self.gather(recorder, &from, &pixel_view, sample, film);
+        });
+    }
+
+    fn gather(
+        &self,
+        recorder: &mut Recorder<'_>,
+        from: &Gathered<'_>,
+        pixel_view: &PixelView,
+        sample: Sample,
+        film: &Film,
+    ) {
+        let Gathered { world, tree, g_buffer, .. } = *from;
+        let environment = &world.environment;
+        let (operator, key) = match self.tone.operator {
+            Operator::Reinhard => (0, self.tone.key),
+            Operator::Filmic => (1, self.tone.key),
+            Operator::None => (2, 0.0),
+        };
+        let settings = &self.settings;
+        macro_rules! gather {
+            ($pass:ident, $params:ident, $surfaces:expr, $constants:expr $(, $field:ident: $value:expr)*) => {{
+                let surfaces = $surfaces;
+                let pass = passes::$pass {
+                    $($field: $value,)*
+                    triangles: surfaces.triangles,
+                    triangle_materials: surfaces.triangle_materials,
+                    attributes: surfaces.attributes,
+                    materials: surfaces.materials,
+                    textures: surfaces.textures,
+                    visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+                    g_position: g_buffer.sampled(&g_buffer.position),
+                    g_normal: g_buffer.sampled(&g_buffer.normal),
+                    g_albedo: g_buffer.sampled(&g_buffer.albedo),
+                    g_specular: g_buffer.sampled(&g_buffer.specular),
+                    g_emission: g_buffer.sampled(&g_buffer.emission),
+                    sender_nodes: &tree.nodes,
+                    sender_light: &tree.light,
+                    leaves: &tree.leaves,
+                    leaf_light: &tree.leaf_light,
+                    adaptation: &tree.adaptation,
+                    positions: &world.positions,
+                    environment_info: &environment.info_buffer,
+                    environment_map: Sampled { image: &environment.map, sampler: &environment.sampler },
+                    environment_cells: &environment.cells,
+                    direct: &film.direct,
+                    indirect: &film.indirect,
+                    gather_counts: &self.counts,
+                    params: passes::$params {
+                        eye: pixel_view.eye,
+                        weight: 1.0 / sample.samples as f32,
+                        sample_index: sample.index,
+                        seed: self.seed,
+                        node_count: tree.node_count(),
+                        threshold: settings.gather_threshold,
+                        exposure: self.tone.exposure.exp2(),
+                        key,
+                        white: self.tone.white,
+                        operator,
+                        clamp_radii: settings.gather_clamp,
+                        jitter: u32::from(settings.gather_jitter),
+                        environment_samples: if environment.info.is_black != 0 { 0 } else { settings.environment_samples },
+                    },
+                    constants: $constants,
+                };
+                recorder.dispatch(&pass, [film.width, film.height]);
+            }};
+        }
+        match from.tracer {
+            Tracer::Compute(bvh, surfaces) => gather!(
+                FinalGather,
+                FinalGatherParams,
+                surfaces,
+                passes::FinalGatherConstants {
+                    alpha_test: surfaces.has_holes,
+                    sees_through: settings.gather_visibility == Visibility::None,
+                },
+                bvh_nodes: bvh.nodes(),
+                bvh_triangles: bvh.triangles()
+            ),
+            Tracer::RayQuery(structure, surfaces) => gather!(
+                FinalGatherRayQuery,
+                FinalGatherRayQueryParams,
+                surfaces,
+                passes::FinalGatherRayQueryConstants { alpha_test: surfaces.has_holes },
+                acceleration_structure: structure
+            ),
+        }
+    }
+
+    /// What the last picture took; waits for the device.
+    pub fn report(&self, context: &Context) -> Result<GatherReport, GpuError> {
+        let counts = context.download(&self.counts)?;
+        let gathered: Vec<_> = counts.iter().filter(|count| count.visited > 0.0).collect();
+        let pixels = gathered.len().max(1) as f64;
+        Ok(GatherReport {
+            pixels: gathered.len() as u64,
+            mean_cut: gathered.iter().map(|count| f64::from(count.cut_size)).sum::<f64>() / pixels,
+            largest_cut: gathered.iter().map(|count| count.cut_size).fold(0.0, f32::max),
+            mean_visited: gathered.iter().map(|count| f64::from(count.visited)).sum::<f64>() / pixels,
+            lost: counts.iter().map(|count| count.lost).sum::<Vec3>() / counts.len().max(1) as f32,
+        })
+    }
+}
