@@ -65,6 +65,7 @@ EnvironmentCell environment_cell(uint index) { return environment_cells[index]; 
 const float NEAR_RADII = 5.0;
 
 Receiver receiver;
+float slack;            // how far rounding may have moved the receiver, metres
 float scale;            // from radiance to what the tone curve takes
 float shown;            // what the pixel shows so far, as the display encodes it
 float shown_luminance;
@@ -117,7 +118,8 @@ Arrival arrival_of(uint node, uvec4 random)
     vec3 sender_normal = leaf_normal(leaf);
     vec3 target = params.jitter != 0 ? leaf_point(leaf, u.xy) : leaf.centre;
     vec3 to_target = target - receiver.position;
-    if (dot(sender_normal, to_target) >= 0.0) return none;
+    // A leaf in the receiver's own plane is not in front of it, whatever rounding says.
+    if (-dot(sender_normal, to_target) <= slack) return none;
 
     vec3 normal = receiver.surface.normal;
     float squared = dot(to_target, to_target);
@@ -182,7 +184,8 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
     vec3 geometric = normalize(cross(b - a, c - a));
     if (dot(geometric, to_eye) < 0.0) geometric = -geometric;
     receiver = Receiver(position.xyz, geometric, to_eye, Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, vec3(0.0), n.xyz, true));
-    vec3 origin = position.xyz + offset_length(a, b, c) * geometric;
+    slack = offset_length(a, b, c);
+    vec3 origin = position.xyz + slack * geometric;
 
     // What the pixel shows before this gather: the mean of its samples so far, this one's direct light included.
     scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);

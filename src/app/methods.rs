@@ -1,4 +1,4 @@
-//! `linklight methods`: every method with its paper and its settings.
+//! `linklight methods`: every method with its paper and its settings, and the settings of display stages.
 
 use std::io::Write;
 
@@ -6,8 +6,9 @@ use serde_json::{Value, json};
 
 use super::AppError;
 use super::cli::MethodsArgs;
+use crate::display::final_gather;
 use crate::methods::METHODS;
-use crate::methods::settings::{Kind, Spec};
+use crate::methods::settings::{Kind, SettingGroup as _, Spec};
 
 pub fn run(args: &MethodsArgs, out: &mut dyn Write) -> Result<(), AppError> {
     if args.json {
@@ -25,6 +26,10 @@ pub fn run(args: &MethodsArgs, out: &mut dyn Write) -> Result<(), AppError> {
         for spec in method.specs() {
             write_setting(&spec, out)?;
         }
+    }
+    writeln!(out, "\n--display final-gather: gathers from the method's solution at every pixel, with visibility")?;
+    for spec in final_gather::Settings::specs() {
+        write_setting(&spec, out)?;
     }
     Ok(())
 }
@@ -59,5 +64,7 @@ fn to_json() -> Result<Value, AppError> {
             "settings": serde_json::to_value(method.specs())?,
         }));
     }
-    Ok(json!({ "schema": "linklight-methods", "version": 1, "methods": methods }))
+    let displays =
+        json!([{ "key": "final-gather", "settings": serde_json::to_value(final_gather::Settings::specs())? }]);
+    Ok(json!({ "schema": "linklight-methods", "version": 1, "methods": methods, "displays": displays }))
 }

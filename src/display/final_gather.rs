@@ -38,7 +38,7 @@ crate::settings! {
     /// What `--display final-gather` lets the user choose.
     pub struct Settings {
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.
-        gather_threshold: f32 = 0.01, range 0.0..=1.0, unit "of white", paper "user-defined";
+        gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Draw leaves, and points on them, by chance and anew in every sample.

@@ -1,0 +1,8 @@
+//! The sender tree and the per-pixel final gather: against plain twins, the sum over all leaves, and the furnace.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod fixture;
+mod gather;
+mod tree;
+mod twins;

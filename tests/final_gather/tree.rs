@@ -1,0 +1,73 @@
+//! What the tree holds on the device, against sums on the CPU.
+
+use crate::common::{Random, TestContext};
+use glam::Vec3;
+use linklight::stages::sender_tree::{self, Representative, SenderTree, TreeOptions, parallelogram, triangle};
+
+/// Power of every node and the leaf that stands for it, by walking below it.
+fn pull(tree: &SenderTree, areas: &[f32], emitted: &[Vec3], reflected: &[Vec3]) -> Vec<(Vec3, Vec3)> {
+    let topology = &tree.topology;
+    let below = |node: usize| {
+        let leaves = (node..topology.nodes[node].skip as usize)
+            .filter(|&below| topology.nodes[below].skip as usize == below + 1)
+            .map(|below| topology.leaf_order[topology.nodes[below].leaf as usize] as usize);
+        leaves.fold((Vec3::ZERO, Vec3::ZERO), |(all, own), leaf| {
+            (all + areas[leaf] * (emitted[leaf] + reflected[leaf]), own + areas[leaf] * emitted[leaf])
+        })
+    };
+    (0..topology.nodes.len()).map(below).collect()
+}
+
+#[test]
+fn powers_add_up_and_representatives_are_the_heaviest() {
+    let context = TestContext::new();
+    for count in [0, 1, 2, 65, 1009] {
+        let random = &mut Random(count);
+        let mut vector = |scale: f32| scale * Vec3::new(random.unit(), random.unit(), random.unit());
+        let leaves: Vec<_> = (0..count)
+            .map(|i| {
+                let (at, u, v) = (vector(5.0), vector(0.2), vector(0.2));
+                if i % 2 == 0 { triangle([at, at + u, at + v]) } else { parallelogram(at, u, v) }
+            })
+            .collect();
+        let (emitted, reflected): (Vec<_>, Vec<_>) = (0..count).map(|_| (vector(3.0), vector(1.0))).unzip();
+        for representative in [Representative::Intensity, Representative::Area] {
+            let options = TreeOptions { representative, ..TreeOptions::default() };
+            let tree = SenderTree::build(&context, &leaves, options).unwrap();
+            let sent = [&emitted, &reflected].map(|values| context.upload("test/sent", values).unwrap());
+            let mut recorder = context.recorder("test").unwrap();
+            tree.pull(&mut recorder, &sent[0], &sent[1]);
+            recorder.submit().unwrap();
+
+            let areas: Vec<f32> = leaves.iter().map(sender_tree::area).collect();
+            let light: Vec<[u32; 4]> = context.download(tree.light.buffer()).unwrap();
+            let float = |texel: [u32; 4]| {
+                Vec3::new(f32::from_bits(texel[0]), f32::from_bits(texel[1]), f32::from_bits(texel[2]))
+            };
+            let expected = pull(&tree, &areas, &emitted, &reflected);
+            for (node, &(power, own)) in expected.iter().enumerate() {
+                let (got, got_own) = (float(light[2 * node]), float(light[2 * node + 1]));
+                let tolerance = 1e-4 * power.max_element();
+                assert!((got - power).abs().max_element() < tolerance, "node {node}: {got} for {power}");
+                assert!((got_own - own).abs().max_element() < tolerance, "node {node}: {got_own} for {own}");
+                // The heavier child's representative is the node's.
+                let skip = tree.topology.nodes[node].skip as usize;
+                if skip == node + 1 {
+                    assert_eq!(light[2 * node + 1][3], tree.topology.nodes[node].leaf);
+                    continue;
+                }
+                let right = tree.topology.nodes[node + 1].skip as usize;
+                let weight = |child: usize| match representative {
+                    Representative::Intensity => f32::from_bits(light[2 * child][3]),
+                    Representative::Area => tree.topology.nodes[child].area,
+                };
+                let heavier = if weight(node + 1) >= weight(right) { node + 1 } else { right };
+                assert_eq!(light[2 * node + 1][3], light[2 * heavier + 1][3], "node {node}");
+            }
+            if count > 2 {
+                let wrong = pull(&tree, &areas, &reflected, &emitted);
+                assert!(wrong[0].1.distance(expected[0].1) > 0.1, "swapped light would go unnoticed");
+            }
+        }
+    }
+}
