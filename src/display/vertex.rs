@@ -40,7 +40,15 @@ pub fn draw(
     for sample in 0..samples {
         let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
         recorder.scope("sample", |recorder| {
-            direct::draw(recorder, world, shadow_maps, g_buffer, &pixel_view, Sample { index: sample, samples, is_unlit: light.colors.is_some() }, film);
+            direct::draw(
+                recorder,
+                world,
+                shadow_maps,
+                g_buffer,
+                &pixel_view,
+                Sample { index: sample, samples, is_unlit: light.colors.is_some() },
+                film,
+            );
             let pass = Vertex {
                 visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
                 g_position: g_buffer.sampled(&g_buffer.position),

@@ -88,7 +88,7 @@ impl Fixture {
             view: &self.view,
         };
         for index in 0..samples {
-            display.draw(&mut recorder, from, Sample { index, samples }, &film);
+            display.draw(&mut recorder, from, Sample { index, samples, is_unlit: false }, &film);
         }
         recorder.submit().unwrap();
         let positions: Vec<[f32; 4]> = context.download_image(&g_buffer.position, 0).unwrap();
