@@ -201,7 +201,6 @@ impl Gather {
 
     /// Solves all bounces but the one that the gather adds, and gathers sample by sample: each is a submission, so that
     /// the user can interrupt between them.
-    #[expect(clippy::too_many_arguments, reason = "everything a frame is made of, each by its own type")]
     fn frame(
         &self,
         context: &Context,
