@@ -7,11 +7,8 @@
 // Bindings 0 to 6 and set 1 are the kernel's.
 #include "lib/environment_sampling.glsl"
 #include "lib/offset.glsl"
-#include "lib/polygon.glsl"
 #include "lib/random.glsl"
-#include "lib/receiver.glsl"
-#include "lib/sender_walk.glsl"
-#include "lib/tone_curve.glsl"
+#include "lib/sender_gather.glsl"
 
 // Of a pixel, means over its samples.
 struct GatherCount {
@@ -61,99 +58,8 @@ uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
 EnvironmentCell environment_cell(uint index) { return environment_cells[index]; }
 
-// Leaves nearer than this many of their radii are measured as polygons, farther ones as points: off by 1 % at most.
-const float NEAR_RADII = 5.0;
-
-Receiver receiver;
-float slack;            // how far rounding may have moved the receiver, metres
-float scale;            // from radiance to what the tone curve takes
-float shown;            // what the pixel shows so far, as the display encodes it
-float shown_luminance;
-
-float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }
-
-// Refine where all of the node's light, gone wrong, would show.                                 [Ritschel2008 4.3]
-// Differs from [Ritschel2008]: on top of what the pixel shows already, where the curve is flatter than at black.
-uint sender_decision(SenderNode node, bool is_leaf)
-{
-    float bound = largest_radiance(node, receiver);
-    if (bound <= 0.0) return SENDER_IGNORE;
-    if (is_leaf) return SENDER_TAKE;
-    float change = display_value(scale * (shown_luminance + bound), params.operator, params.white) - shown;
-    return change > params.threshold ? SENDER_REFINE : SENDER_TAKE;
-}
-
-// One ray's worth of light: what the eye sees of it if nothing is in between.
-struct Arrival {
-    vec3 direct;        // W m^-2 sr^-1: emitted by the sender itself
-    vec3 indirect;
-    vec3 lost;          // what clamping took from both
-    vec3 target;
-    uint leaf;
-};
-
-// The light of a node of the cut, by a leaf that is drawn from it, or by its representative.
-Arrival arrival_of(uint node, uvec4 random)
-{
-    vec4 u = vec4(0.5);
-    if (params.jitter != 0) u = fract(unit_interval(random) + float(params.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.0));
-    uint slot;
-    vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
-    if (params.jitter != 0) {
-        uint drawn = draw_leaf(node, u.z);
-        slot = sender_leaf(drawn);
-        float share = sender_weight(drawn);
-        float by = share > 0.0 ? sender_weight(node) / share : 0.0;
-        emitted = by * leaf_light[slot].emitted;
-        reflected = by * leaf_light[slot].reflected;
-    } else {
-        slot = sender_leaf(node);
-        float area = leaf_area(leaves[slot]);
-        emitted = sender_emitted_power(node) / area;
-        reflected = uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * node).xyz) / area - emitted;
-    }
-
-    Arrival none = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), slot);
-    SenderLeaf leaf = leaves[slot];
-    vec3 sender_normal = leaf_normal(leaf);
-    vec3 target = params.jitter != 0 ? leaf_point(leaf, u.xy) : leaf.centre;
-    vec3 to_target = target - receiver.position;
-    // A leaf in the receiver's own plane is not in front of it, whatever rounding says.
-    if (-dot(sender_normal, to_target) <= slack) return none;
-
-    vec3 normal = receiver.surface.normal;
-    float squared = dot(to_target, to_target);
-    float radius_squared = max(dot(leaf.edge_u, leaf.edge_u), dot(leaf.edge_v, leaf.edge_v));
-    float cos_receiver = dot(normal, to_target), cos_sender = -dot(sender_normal, to_target);
-    float form_factor = max(cos_receiver, 0.0) * cos_sender * leaf_area(leaf) / (PI * squared * squared);
-    float exact = form_factor;
-    if (squared < NEAR_RADII * NEAR_RADII * radius_squared) {
-        vec3 corners[4];
-        uint count = leaf_corners(leaf, corners);
-        for (uint k = 0; k < 4; ++k) corners[k] -= receiver.position;
-        SeenPolygon seen = seen_polygon(corners, count, normal);
-        exact = seen.form_factor;
-        // Of a leaf that the horizon cuts, the part above it sends.
-        if (cos_receiver <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) {
-            to_target = seen.middle;
-            target = receiver.position + to_target;
-            squared = dot(to_target, to_target);
-            form_factor = exact;
-        }
-    }
-    if (params.clamp_radii > 0.0)
-        form_factor = min(form_factor * min(squared / (params.clamp_radii * params.clamp_radii * radius_squared), 1.0), exact);
-    else
-        form_factor = exact;
-    if (exact <= 0.0 || squared <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) return none;
-
-    vec3 reflectance = brdf_value(receiver.surface, receiver.to_eye, to_target / sqrt(squared));
-    vec3 lost = (exact - form_factor) * reflectance * (emitted + reflected);
-        vec3 size = abs(target);
-    // Ends before the leaf's own surface.
-    target += max(size.x, max(size.y, size.z)) * (1.0 / 524288.0) * sender_normal;
-    return Arrival(form_factor * reflectance * emitted, form_factor * reflectance * reflected, lost, target, slot);
-}
+SenderLeaf sender_shape(uint slot) { return leaves[slot]; }
+LeafLight sender_leaf_light(uint slot) { return leaf_light[slot]; }
 
 // One of the environment's directions.
 Arrival environment_arrival(uvec4 random, float share)
@@ -187,11 +93,11 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
     slack = offset_length(a, b, c);
     vec3 origin = position.xyz + slack * geometric;
 
+    float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
+    options = GatherOptions(params.threshold, scale, params.white, params.operator, params.clamp_radii, params.jitter != 0, params.sample_index);
     // What the pixel shows before this gather: the mean of its samples so far, this one's direct light included.
-    scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
     float samples_so_far = params.weight * float(params.sample_index + 1);
-    shown_luminance = luminance(direct[index] + indirect[index]) / samples_so_far;
-    shown = display_value(scale * shown_luminance, params.operator, params.white);
+    start_showing(luminance(direct[index] + indirect[index]) / samples_so_far);
 
     vec3 direct_sum = vec3(0.0), indirect_sum = vec3(0.0), lost_sum = vec3(0.0);
     uint node = 0, visited = 0, cut = 0, environment_taken = 0;
@@ -215,8 +121,7 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
         direct_sum += free * arrival.direct;
         indirect_sum += free * arrival.indirect;
         lost_sum += free * arrival.lost;
-        shown_luminance += free * luminance(arrival.direct + arrival.indirect);
-        shown = display_value(scale * shown_luminance, params.operator, params.white);
+        start_showing(shown_luminance + free * luminance(arrival.direct + arrival.indirect));
     }
     direct[index] += params.weight * direct_sum;
     indirect[index] += params.weight * indirect_sum;

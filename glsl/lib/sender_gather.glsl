@@ -1,0 +1,126 @@
+#ifndef LIB_SENDER_GATHER
+#define LIB_SENDER_GATHER
+// What a receiver takes from the nodes of its cut: the oracle of the walk, and the light of a node by one of its leaves.
+//
+// Bridges, beside the tables of lib/sender_tree.glsl:
+//     SenderLeaf sender_shape(uint slot)
+//     LeafLight sender_leaf_light(uint slot)
+#include "lib/polygon.glsl"
+#include "lib/random.glsl"
+#include "lib/receiver.glsl"
+#include "lib/sender_walk.glsl"
+#include "lib/tone_curve.glsl"
+
+SenderLeaf sender_shape(uint slot);
+LeafLight sender_leaf_light(uint slot);
+
+struct GatherOptions {
+    float threshold;            // of what the display shows, 0..1
+    float scale;                // from radiance to what the tone curve takes
+    float white;
+    uint operator;
+    float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
+    bool jitter;
+    uint sample_index;
+};
+GatherOptions options;
+
+// Leaves nearer than this many of their radii are measured as polygons, farther ones as points: off by 1 % at most.
+const float NEAR_RADII = 5.0;
+
+Receiver receiver;
+float slack;            // how far rounding may have moved the receiver, metres
+float shown;            // what the pixel shows so far, as the display encodes it
+float shown_luminance;
+
+void start_showing(float luminance_so_far)
+{
+    shown_luminance = luminance_so_far;
+    shown = display_value(options.scale * luminance_so_far, options.operator, options.white);
+}
+
+float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }
+
+// Refine where all of the node's light, gone wrong, would show.                                 [Ritschel2008 4.3]
+// Differs from [Ritschel2008]: on top of what the pixel shows already, where the curve is flatter than at black.
+uint sender_decision(SenderNode node, bool is_leaf)
+{
+    float bound = largest_radiance(node, receiver);
+    if (bound <= 0.0) return SENDER_IGNORE;
+    if (is_leaf) return SENDER_TAKE;
+    float change = display_value(options.scale * (shown_luminance + bound), options.operator, options.white) - shown;
+    return change > options.threshold ? SENDER_REFINE : SENDER_TAKE;
+}
+
+// One ray's worth of light: what the eye sees of it if nothing is in between.
+struct Arrival {
+    vec3 direct;        // W m^-2 sr^-1: emitted by the sender itself
+    vec3 indirect;
+    vec3 lost;          // what clamping took from both
+    vec3 target;
+    uint leaf;
+};
+
+// The light of a node of the cut, by a leaf that is drawn from it, or by its representative.
+Arrival arrival_of(uint node, uvec4 random)
+{
+    vec4 u = vec4(0.5);
+    if (options.jitter) u = fract(unit_interval(random) + float(options.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.0));
+    uint slot;
+    vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
+    if (options.jitter) {
+        uint drawn = draw_leaf(node, u.z);
+        slot = sender_leaf(drawn);
+        float share = sender_weight(drawn);
+        float by = share > 0.0 ? sender_weight(node) / share : 0.0;
+        emitted = by * sender_leaf_light(slot).emitted;
+        reflected = by * sender_leaf_light(slot).reflected;
+    } else {
+        slot = sender_leaf(node);
+        float area = leaf_area(sender_shape(slot));
+        emitted = sender_emitted_power(node) / area;
+        reflected = uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * node).xyz) / area - emitted;
+    }
+
+    Arrival none = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), slot);
+    SenderLeaf leaf = sender_shape(slot);
+    vec3 sender_normal = leaf_normal(leaf);
+    vec3 target = options.jitter ? leaf_point(leaf, u.xy) : leaf.centre;
+    vec3 to_target = target - receiver.position;
+    // A leaf in the receiver's own plane is not in front of it, whatever rounding says.
+    if (-dot(sender_normal, to_target) <= slack) return none;
+
+    vec3 normal = receiver.surface.normal;
+    float squared = dot(to_target, to_target);
+    float radius_squared = max(dot(leaf.edge_u, leaf.edge_u), dot(leaf.edge_v, leaf.edge_v));
+    float cos_receiver = dot(normal, to_target), cos_sender = -dot(sender_normal, to_target);
+    float form_factor = max(cos_receiver, 0.0) * cos_sender * leaf_area(leaf) / (PI * squared * squared);
+    float exact = form_factor;
+    if (squared < NEAR_RADII * NEAR_RADII * radius_squared) {
+        vec3 corners[4];
+        uint count = leaf_corners(leaf, corners);
+        for (uint k = 0; k < 4; ++k) corners[k] -= receiver.position;
+        SeenPolygon seen = seen_polygon(corners, count, normal);
+        exact = seen.form_factor;
+        // Of a leaf that the horizon cuts, the part above it sends.
+        if (cos_receiver <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) {
+            to_target = seen.middle;
+            target = receiver.position + to_target;
+            squared = dot(to_target, to_target);
+            form_factor = exact;
+        }
+    }
+    if (options.clamp_radii > 0.0)
+        form_factor = min(form_factor * min(squared / (options.clamp_radii * options.clamp_radii * radius_squared), 1.0), exact);
+    else
+        form_factor = exact;
+    if (exact <= 0.0 || squared <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) return none;
+
+    vec3 reflectance = brdf_value(receiver.surface, receiver.to_eye, to_target / sqrt(squared));
+    vec3 lost = (exact - form_factor) * reflectance * (emitted + reflected);
+        vec3 size = abs(target);
+    // Ends before the leaf's own surface.
+    target += max(size.x, max(size.y, size.z)) * (1.0 / 524288.0) * sender_normal;
+    return Arrival(form_factor * reflectance * emitted, form_factor * reflectance * reflected, lost, target, slot);
+}
+#endif
