@@ -2,6 +2,7 @@
 
 use super::AppError;
 use super::cli::{Channel, Display};
+use super::on_elements::OnElements;
 use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
 use crate::display::direct::Sample;
@@ -12,16 +13,18 @@ use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{self, ExplicitVisibility};
+use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
 use crate::stages::film::Film;
 use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
+use glam::UVec2;
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {
     PathTracing(Box<PathTracing>),
-    ExplicitVisibility(Box<VertexShown>),
+    OnElements(Box<VertexShown>),
     Antiradiance(Box<AntiradianceShown>),
 }
 
@@ -32,9 +35,9 @@ pub struct AntiradianceShown {
     g_buffer: GBuffer,
 }
 
-/// Explicit visibility with the display stage that shows it.
+/// A method with the display stages that show it.
 pub struct VertexShown {
-    method: ExplicitVisibility,
+    method: Box<dyn OnElements>,
     shadow_maps: ShadowMaps,
     g_buffer: GBuffer,
     gather: Option<Gather>,
@@ -85,13 +88,12 @@ impl Method {
                 let method = ExplicitVisibility::prepare(context, &explicit_stage(stage, watch), settings);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
-                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
-                let g_buffer = GBuffer::new(context, request.width, request.height)?;
-                let gather = match request.display {
-                    Some(Display::FinalGather) => Some(Gather::new(context, request, stage, &method)?),
-                    _ => None,
-                };
-                Ok(Self::ExplicitVisibility(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
+                Self::on_elements(context, request, stage, Box::new(method))
+            }
+            "implicit-visibility" => {
+                let settings = request.settings()?;
+                let method = ImplicitVisibility::prepare(context, &explicit_stage(stage, watch), settings);
+                Self::on_elements(context, request, stage, Box::new(method.map_err(AppError::failed)?))
             }
             "antiradiance" => {
                 let method = Antiradiance::prepare(context, &explicit_stage(stage, watch), request.settings()?);
@@ -103,6 +105,21 @@ impl Method {
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
+    }
+
+    fn on_elements(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        method: Box<dyn OnElements>,
+    ) -> Result<Self, AppError> {
+        let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+        let g_buffer = GBuffer::new(context, request.width, request.height)?;
+        let gather = match request.display {
+            Some(Display::FinalGather) => Some(Gather::new(context, request, stage, &*method)?),
+            _ => None,
+        };
+        Ok(Self::OnElements(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
     }
 
     /// One frame into `film`.
@@ -141,19 +158,23 @@ impl Method {
                 }
                 Ok(())
             }
-            Self::ExplicitVisibility(shown) => {
-                let VertexShown { method, shadow_maps, g_buffer, gather } = &**shown;
+            Self::OnElements(shown) => {
+                let VertexShown { method, shadow_maps, g_buffer, gather } = &mut **shown;
                 if let Some(gather) = gather {
-                    return gather.frame(context, request, stage, shown, film, watch);
+                    // One bounce less: the gather adds it.
+                    method.solve(context, &explicit_stage(stage, watch), request.bounces.saturating_sub(1))?;
+                    return gather.frame(context, request, stage, (&**method, shadow_maps, g_buffer), film, watch);
                 }
+                method.solve(context, &explicit_stage(stage, watch), request.bounces)?;
+                let size = UVec2::new(request.width, request.height);
+                let colors = method.false_colors(context, world, view, size)?;
                 let mut recorder = context.recorder("frame")?;
-                recorder.scope("explicit-visibility", |recorder| method.solve(recorder, world, request.bounces));
                 recorder.scope("display", |recorder| {
                     let light = VertexLight {
                         direct_irradiance: method.direct_irradiance(),
                         indirect_irradiance: method.indirect_irradiance(),
-                        back_elements: method.back_elements(),
-                        colors: None,
+                        back_elements: &method.elements().back_elements,
+                        colors: colors.as_ref(),
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
@@ -187,7 +208,7 @@ impl Gather {
         context: &Context,
         request: &RenderRequest,
         stage: &Stage,
-        method: &ExplicitVisibility,
+        method: &dyn OnElements,
     ) -> Result<Self, AppError> {
         let settings = request.final_gather_settings()?;
         let positions = context.download(&stage.world.positions)?;
@@ -199,38 +220,35 @@ impl Gather {
         Ok(Self { leaves, display })
     }
 
-    /// Solves all bounces but the one that the gather adds, and gathers sample by sample: each is a submission, so that
-    /// the user can interrupt between them.
+    /// Gathers a solution sample by sample: each is a submission, so that the user can interrupt between them.
     fn frame(
         &self,
         context: &Context,
         request: &RenderRequest,
         stage: &Stage,
-        shown: &VertexShown,
+        (method, shadow_maps, g_buffer): (&dyn OnElements, &ShadowMaps, &GBuffer),
         film: &Film,
         watch: &dyn Watch,
     ) -> Result<(), AppError> {
-        let (method, world) = (&shown.method, &stage.world);
+        let world = &stage.world;
+        let elements = method.elements();
+        let elements = VertexElements {
+            emission: &elements.emission,
+            albedo: &elements.albedo,
+            punctual: method.punctual_irradiance(),
+            direct: method.direct_irradiance(),
+            indirect: method.indirect_irradiance(),
+        };
         let mut recorder = context.recorder("frame")?;
-        recorder.scope("explicit-visibility", |recorder| {
-            method.solve(recorder, world, request.bounces.saturating_sub(1));
-            let elements = VertexElements {
-                emission: &method.elements().emission,
-                albedo: &method.elements().albedo,
-                punctual: method.punctual_irradiance(),
-                direct: method.direct_irradiance(),
-                indirect: method.indirect_irradiance(),
-            };
-            self.leaves.fill(recorder, elements, request.bounces > 0);
-        });
-        recorder.scope("display", |recorder| shown.shadow_maps.draw(recorder, world, &stage.pose, stage.bounds));
+        self.leaves.fill(&mut recorder, elements, request.bounces > 0);
+        recorder.scope("display", |recorder| shadow_maps.draw(recorder, world, &stage.pose, stage.bounds));
         recorder.submit()?;
         let gathered = Gathered {
             world,
             tree: &self.leaves.tree,
             tracer: stage.tracer(),
-            shadow_maps: &shown.shadow_maps,
-            g_buffer: &shown.g_buffer,
+            shadow_maps,
+            g_buffer,
             view: &stage.view,
         };
         for index in 0..request.spp {

@@ -18,6 +18,7 @@ mod frame;
 pub mod interrupt;
 pub mod measure;
 pub mod methods;
+mod on_elements;
 pub mod output;
 pub mod render;
 mod stage;

@@ -5,6 +5,7 @@
 
 pub mod antiradiance;
 pub mod explicit_visibility;
+pub mod implicit_visibility;
 mod papers;
 pub mod path_tracing;
 pub mod pick;
@@ -14,7 +15,7 @@ use serde_json::{Map, Value};
 
 pub use papers::{PAPERS, Paper};
 
-use papers::{DACHSBACHER_2007, KAJIYA_1986, SCHMITZ_2008};
+use papers::{DACHSBACHER_2007, DONG_2007, KAJIYA_1986, SCHMITZ_2008};
 use settings::{Assignment, SettingError, SettingGroup, Spec};
 
 /// Values of all settings by name, or what is wrong with an assignment.
@@ -59,6 +60,11 @@ pub const METHODS: &[Method] = &[
         "antiradiance",
         &DACHSBACHER_2007,
         "light crosses surfaces freely, and negative light sent on by each surface takes away what was blocked",
+    ),
+    Method::new::<implicit_visibility::Settings>(
+        "implicit-visibility",
+        &DONG_2007,
+        "no rays: in each direction bin of an element the nearest node of surfel trees wins, and its light is gathered",
     ),
     Method::new::<path_tracing::Settings>(
         "path-tracing",

@@ -33,6 +33,15 @@ pub(super) const DACHSBACHER_2007: Paper = Paper {
     doi: Some("10.1145/1276377.1276453"),
 };
 
+pub(super) const DONG_2007: Paper = Paper {
+    key: "Dong2007",
+    title: "Interactive Global Illumination Using Implicit Visibility",
+    authors: "Zhao Dong, Jan Kautz, Christian Theobalt, Hans-Peter Seidel",
+    year: 2007,
+    venue: "Pacific Graphics 2007",
+    doi: Some("10.1109/PG.2007.37"),
+};
+
 pub(super) const KAJIYA_1986: Paper = Paper {
     key: "Kajiya1986",
     title: "The Rendering Equation",
@@ -86,6 +95,7 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1137/0713071"),
     },
     DACHSBACHER_2007,
+    DONG_2007,
     Paper {
         key: "Duff2017",
         title: "Building an Orthonormal Basis, Revisited",

@@ -12,6 +12,7 @@ pub mod levels;
 pub mod links;
 pub mod pair_queue;
 pub mod punctual;
+pub mod quadtree;
 pub mod scan;
 pub mod sender_tree;
 pub mod trace;

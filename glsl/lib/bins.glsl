@@ -1,0 +1,68 @@
+#ifndef LIB_BINS
+#define LIB_BINS
+// Direction bins: the texels of a cube map of n x n texels a face, about a receiver.                 [Dong2007 4.2.2]
+// Faces +x, -x, +y, -y, +z, -z; within a face u runs along the axis after its own and v along the one after that.
+
+const uint EMPTY_BIN = 0xffffffffu;     // of a winner: nothing is seen
+const uint BACK_SEEN = 0x80000000u;     // of a winner: it turns its back
+const uint NODE_MASK = 0x7fffffffu;
+
+// Where links are received: a node's centre, or for a leaf the point its rays would start from.
+struct Receiver {
+    vec3 origin;        // m
+    vec3 normal;        // unit
+    vec4 frame;         // quaternion that turns directions of its bins into world space
+};
+
+// The nodes of one level that the present window of receivers has.
+struct WindowLevel {
+    uint first;         // node
+    uint count;
+    uint row;           // of the first node, in the table of bins
+};
+
+vec3 turn(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+vec3 turn_back(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) - q.w * v); }
+
+// Direction through (u, v) in -1..1 of a face, not of unit length: its component along the face's axis is +-1.
+vec3 face_direction(uint face, vec2 uv)
+{
+    float side = (face & 1) == 0 ? 1.0 : -1.0;
+    uint axis = face >> 1;
+    return axis == 0 ? vec3(side, uv) : axis == 1 ? vec3(uv.y, side, uv.x) : vec3(uv, side);
+}
+
+// A direction in the face's own axes: (u, v, along its axis outwards).
+vec3 in_face(uint face, vec3 d)
+{
+    float side = (face & 1) == 0 ? 1.0 : -1.0;
+    uint axis = face >> 1;
+    return axis == 0 ? vec3(d.yz, side * d.x) : axis == 1 ? vec3(d.z, d.x, side * d.y) : vec3(d.xy, side * d.z);
+}
+
+uint face_of(vec3 d)
+{
+    vec3 a = abs(d);
+    uint axis = a.x >= a.y && a.x >= a.z ? 0u : a.y >= a.z ? 1u : 2u;
+    float along = axis == 0 ? d.x : axis == 1 ? d.y : d.z;
+    return 2 * axis + (along < 0.0 ? 1u : 0u);
+}
+
+uint bin_of(vec3 d, uint n)
+{
+    uint face = face_of(d);
+    vec3 at = in_face(face, d);
+    uvec2 cell = min(uvec2(clamp(0.5 * at.xy / at.z + 0.5, 0.0, 1.0) * float(n)), uvec2(n - 1));
+    return (face * n + cell.y) * n + cell.x;
+}
+
+// Place in -1..1 of a cell's centre.
+float cell_centre(uint cell, uint n) { return (2.0 * float(cell) + 1.0) / float(n) - 1.0; }
+
+// Towards the centre of a bin, not of unit length.
+vec3 bin_direction(uint bin, uint n)
+{
+    uint in_map = bin % (n * n);
+    return face_direction(bin / (n * n), vec2(cell_centre(in_map % n, n), cell_centre(in_map / n, n)));
+}
+#endif

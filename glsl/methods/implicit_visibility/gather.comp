@@ -1,0 +1,55 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/bins.glsl"
+#include "lib/quadtree.glsl"
+
+// One thread per leaf of a window: irradiance from the winners of its bins.                        [Dong2007 4.3, Eq. 5]
+// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr: the integral of
+// the unit direction over the bin), surfels, node_radiosity [node_count] (W/m2)   writes irradiance[element_count] (W/m2)
+// shared none.  Differs from [Dong2007]: see IS_PAPER.
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Receivers { Receiver receivers[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer LeafElements { uint leaf_elements[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinVectors { vec3 bin_vectors[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Surfels { Surfel surfels[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer NodeRadiosity { vec3 node_radiosity[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
+layout(push_constant, scalar) uniform Params {
+    uint first_leaf;
+    uint leaf_count;    // of the window
+    uint bin_count;
+    uint is_bounded;    // coverage: a sender fills no more of its bin than its own solid angle
+} params;
+// 1: the paper's Eq. 5, a point to a disc. 0: the sender covers its bin, so its weight is the bin's own form factor,
+// scaled so that all bins above the horizon together weigh pi.
+layout(constant_id = 0) const uint IS_PAPER = 0;
+
+const float PI = 3.14159265358979;
+
+void main()
+{
+    uint local = linear_index();
+    if (local >= params.leaf_count) return;
+    Receiver at = receivers[params.first_leaf + local];
+    vec3 normal = turn_back(at.frame, at.normal);
+    vec3 sum = vec3(0.0);
+    float total = 0.0;
+    for (uint bin = 0; bin < params.bin_count; ++bin) {
+        float weight = dot(bin_vectors[bin], normal);
+        if (weight <= 0.0) continue;
+        total += weight;
+        uint winner = winners[bin * params.leaf_count + local];
+        if (winner >= BACK_SEEN) continue;
+        if (IS_PAPER != 0 || params.is_bounded != 0) {
+            Surfel s = surfels[winner];
+            vec3 offset = s.centre - at.origin;
+            float squared = dot(offset, offset);
+            float solid_angle = s.area * max(dot(s.normal, -offset), 0.0) / (squared * sqrt(squared));
+            if (IS_PAPER != 0) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
+            else weight *= min(1.0, solid_angle / length(bin_vectors[bin]));
+        }
+        sum += weight * node_radiosity[winner];
+    }
+    irradiance[leaf_elements[params.first_leaf + local]] = sum / (IS_PAPER != 0 || total == 0.0 ? PI : total);
+}

@@ -1,0 +1,85 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/element.glsl"
+#include "lib/surfel.glsl"
+
+// One thread per leaf: the surfel of its element, from the third of each triangle around that belongs to it.   [Dong2007 4.1]
+// reads leaf_elements[leaf_count], element_vertices, element_normals [element_count], positions, triangles,
+// incident_offsets[vertex_count + 1], incident_triangles   writes surfels, moments [leaf_count ..]   shared none
+// Differs from [Dong2007]: an ellipse about the middle of the vertex's cell instead of a disc about the vertex, so that
+// cells on edges and long cells cover no more than is there, and all of it.
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer LeafElements { uint leaf_elements[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer ElementVertices { uint element_vertices[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer ElementNormals { vec3 element_normals[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer IncidentOffsets { uint incident_offsets[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer IncidentTriangles { uint incident_triangles[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Surfels { Surfel surfels[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Moments { SurfelMoments moments[]; };
+layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
+
+void main()
+{
+    uint leaf = linear_index();
+    if (leaf >= params.leaf_count) return;
+
+    uint element = leaf_elements[leaf], entry = element_vertices[element];
+    uint vertex = vertex_of(entry);
+    uint first = incident_offsets[vertex], last = incident_offsets[vertex + 1];
+    vec3 origin = positions[vertex];
+
+    // Sums over the cell with the vertex as origin. A corner's third of a triangle is a quadrangle: the corner, the
+    // middles of its two edges, the centroid; cut in two along the line from the corner, each half a sixth.
+    vec3 first_moment = vec3(0.0), diagonal = vec3(0.0), mixed = vec3(0.0), across_sum = vec3(0.0);
+    float area = 0.0;
+    for (uint k = first; k < last; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        vec3 across = cross(b - a, c - a);
+        float sixth = 0.5 * length(across) / 6.0;
+        vec3 p = (v.x == vertex ? b : v.y == vertex ? c : a) - origin;
+        vec3 q = (v.x == vertex ? c : v.y == vertex ? a : b) - origin;
+        vec3 centre = (p + q) / 3.0;
+        for (uint half_index = 0; half_index < 2; ++half_index) {
+            vec3 middle = 0.5 * (half_index == 0 ? p : q), sum = middle + centre;
+            first_moment += sixth * sum / 3.0;
+            diagonal += sixth / 12.0 * (middle * middle + centre * centre + sum * sum);
+            mixed += sixth / 12.0 * (middle * middle.yzx + centre * centre.yzx + sum * sum.yzx);
+        }
+        area += 2.0 * sixth;
+        across_sum += across / 6.0;
+    }
+
+    Surfel s;
+    SurfelMoments m;
+    vec3 mean = area > 0.0 ? first_moment / area : vec3(0.0);
+    m.diagonal = area > 0.0 ? max(diagonal / area - mean * mean, vec3(0.0)) : vec3(0.0);
+    m.mixed = area > 0.0 ? mixed / area - mean * mean.yzx : vec3(0.0);
+    m.across = side_of(entry) * across_sum;
+    float length_across = length(m.across);
+    s.centre = origin + mean;
+    s.normal = length_across > 0.0 ? m.across / length_across : element_normals[element];
+    s.area = area;
+    // The element's own normal is what its light is computed with: it belongs to the cone.
+    s.cos_cone = clamp(dot(s.normal, element_normals[element]), -1.0, 1.0);
+    s.radius = s.thickness = 0.0;
+    for (uint k = first; k < last; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        vec3 p = (v.x == vertex ? b : v.y == vertex ? c : a) - origin;
+        vec3 q = (v.x == vertex ? c : v.y == vertex ? a : b) - origin;
+        vec3 corners[4] = vec3[4](vec3(0.0), 0.5 * p, 0.5 * q, (p + q) / 3.0);
+        for (uint i = 0; i < 4; ++i) {
+            s.radius = max(s.radius, length(corners[i] - mean));
+            s.thickness = max(s.thickness, abs(dot(corners[i] - mean, s.normal)));
+        }
+        vec3 across = side_of(entry) * cross(b - a, c - a);
+        float squared = dot(across, across);
+        if (squared > 0.0) s.cos_cone = min(s.cos_cone, dot(s.normal, across) / sqrt(squared));
+    }
+    shape_surfel(m, s);
+    surfels[leaf] = s;
+    moments[leaf] = m;
+}

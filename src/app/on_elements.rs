@@ -1,0 +1,97 @@
+//! What the frame asks of a method that solves on elements, whichever it is.
+
+use super::AppError;
+use crate::display::false_color::picked_element;
+use crate::gpu::{Buffer, Context};
+use crate::methods::explicit_visibility::{ExplicitVisibility, Stage};
+use crate::methods::implicit_visibility::ImplicitVisibility;
+use crate::scene::camera::View;
+use crate::stages::elements::Elements;
+use crate::stages::world::World;
+use glam::{UVec2, Vec3};
+
+/// A method whose solution is irradiance per element.
+pub trait OnElements {
+    /// The light of direct illumination and `bounces` more, with all that has to be made anew for a frame.
+    fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError>;
+    fn elements(&self) -> &Elements;
+    /// From punctual lights, W/m2 per element.
+    fn punctual_irradiance(&self) -> &Buffer<Vec3>;
+    /// From emitters and the environment.
+    fn direct_irradiance(&self) -> &Buffer<Vec3>;
+    /// Reflected at least once.
+    fn indirect_irradiance(&self) -> &Buffer<Vec3>;
+
+    /// The colours of the debug view that the settings ask for, if they do, for a picture of `size` pixels.
+    fn false_colors(&self, _: &Context, _: &World, _: &View, _: UVec2) -> Result<Option<Buffer<Vec3>>, AppError> {
+        Ok(None)
+    }
+}
+
+impl OnElements for ExplicitVisibility {
+    fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("explicit-visibility", |recorder| Self::solve(self, recorder, stage.world, bounces));
+        Ok(recorder.submit()?)
+    }
+
+    fn elements(&self) -> &Elements {
+        Self::elements(self)
+    }
+
+    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+        Self::punctual_irradiance(self)
+    }
+
+    fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        Self::direct_irradiance(self)
+    }
+
+    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        Self::indirect_irradiance(self)
+    }
+}
+
+impl OnElements for ImplicitVisibility {
+    fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
+        self.link(context, stage).map_err(AppError::failed)?;
+        tracing::info!("{}", self.report());
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("implicit-visibility", |recorder| Self::solve(self, recorder, stage.world, bounces));
+        Ok(recorder.submit()?)
+    }
+
+    fn elements(&self) -> &Elements {
+        Self::elements(self)
+    }
+
+    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+        Self::punctual_irradiance(self)
+    }
+
+    fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        Self::direct_irradiance(self)
+    }
+
+    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        Self::indirect_irradiance(self)
+    }
+
+    fn false_colors(
+        &self,
+        context: &Context,
+        world: &World,
+        view: &View,
+        size: UVec2,
+    ) -> Result<Option<Buffer<Vec3>>, AppError> {
+        if !self.shows_view() {
+            return Ok(None);
+        }
+        let positions = context.download(&world.positions)?;
+        let triangles = context.download(&world.triangles)?;
+        let backs = &self.elements().topology.back_elements;
+        let picked = picked_element(self.settings().pick, &positions, &triangles, backs, view, size);
+        let colors = self.view_colors(context, picked).map_err(AppError::failed)?;
+        Ok(Some(context.upload("implicit/view colors", &colors)?))
+    }
+}

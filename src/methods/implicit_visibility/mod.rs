@@ -1,0 +1,430 @@
+//! Implicit visibility [Dong2007]: each element keeps, for each direction, only its shortest link. No ray is cast.
+//!
+//! Directions are the texels of a cube map about each element, its bins. Links are made between nodes of surfel trees
+//! that fill no more than a bin of each other; each goes into the bins it covers, and each bin keeps its nearest.
+//! Pushed down to the leaves, the winners are what each element sees: light is gathered from them, and a bin without a
+//! winner sees the environment. All of it is made anew each frame, so that everything may move and deform.
+//!
+//! | paper | here | unit | buffer |
+//! |---|---|---|---|
+//! | N_bin = 6 N N | [`Settings::bins`] is N | – | – |
+//! | Omega_bin | `bin_solid_angles`; times cosine, `bin_vectors` . n | sr | `implicit/bin ...` |
+//! | x, n_x | receiver | m, – | `implicit/receivers` |
+//! | y, n_y, A_y | surfel: centre, normal, area | m, –, m2 | `quadtree/surfels` |
+//! | y_s, the closest in a bin | winner | – | `implicit/winners` |
+//! | f_r | albedo / pi | 1/sr | [`Elements::albedo`] |
+//! | unshot energy | radiosity of nodes | W/m2 | `implicit/node radiosity` |
+//!
+//! **Per frame with new links** ([`ImplicitVisibility::link`]): anything that moves or deforms. **Without:** lights,
+//! materials, the environment.
+//!
+//! Differs from [Dong2007]: surfels fill all the bins they cover, at their distance in each, so that no light leaks where
+//! leaves are larger than bins; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
+//! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays (shared with the other
+//! methods). What it does not do: glossy transport between elements.
+//!
+//! [Dong2007]: crate::methods::PAPERS
+
+pub mod bins;
+mod linking;
+mod report;
+mod settings;
+mod views;
+pub mod windows;
+
+pub use linking::{ImplicitError, Linking, Window};
+pub use report::Report;
+pub use settings::{Footprint, Frames, Settings, Transport};
+pub use views::DebugView;
+
+use crate::gpu::shaders::elements::{EmittedRadiosity, EmittedRadiosityParams, FillUnresolved, FillUnresolvedParams};
+use crate::gpu::shaders::methods::implicit_visibility as passes;
+use crate::gpu::shaders::types::Ray;
+use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
+use crate::methods::explicit_visibility::Stage;
+use crate::scene::charts::{self, Charts};
+use crate::scene::environment::Environment;
+use crate::stages::elements::{ElementTopology, Elements};
+use crate::stages::emitters::Emitters;
+use crate::stages::punctual;
+use crate::stages::quadtree::Quadtrees;
+use crate::stages::quadtree::topology::QuadtreeTopology;
+use crate::stages::world::{World, WorldEnvironment};
+use glam::Vec3;
+use linking::Sizes;
+
+/// The method on one scene.
+pub struct ImplicitVisibility {
+    settings: Settings,
+    pub charts: Charts,
+    elements: Elements,
+    trees: Quadtrees,
+    emitters: Emitters,
+    linking: Linking,
+    state: State,
+    /// At the density of the bins.
+    environment: WorldEnvironment,
+    /// Mean over each bin along the world's axes, W m^-2 sr^-1.
+    bin_radiance: Buffer<Vec3>,
+    report: Report,
+}
+
+/// Light on the elements, W/m2, and scratch; `element_count` entries each unless said otherwise.
+struct State {
+    radiosity: Buffer<Vec3>,
+    /// `node_count` entries.
+    node_radiosity: Buffer<Vec3>,
+    irradiance: Buffer<Vec3>,
+    punctual: Buffer<Vec3>,
+    /// From emitters and the environment.
+    direct: Buffer<Vec3>,
+    indirect: Buffer<Vec3>,
+    smoothed: Buffer<Vec3>,
+    /// Thousandths of backs seen.
+    outcomes: Buffer<u32>,
+    /// Per light, then per element; 0..1.
+    visibility: Buffer<f32>,
+    /// Shadow rays of a batch, and their answers.
+    rays: Buffer<Ray>,
+    is_free: Buffer<u32>,
+}
+
+/// Shadow rays of a batch.
+const BATCH_RAYS: usize = 1 << 18;
+
+impl ImplicitVisibility {
+    /// Charts, trees, and room for links: what is done once. Follow with [`Self::link`].
+    pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, ImplicitError> {
+        let Stage { scene, geometry, rest_positions, environment, world, .. } = *stage;
+        let topology = ElementTopology::new(scene, geometry, rest_positions);
+        let options = charts::Options { model_uv: settings.model_charts, ..charts::Options::default() };
+        let charts = charts::unwrap(&charts::Surface::of(geometry, rest_positions), &options);
+        let tree_topology = QuadtreeTopology::new(&charts, &topology.vertices); // 4.1
+
+        let sizes = Sizes::new(context, &tree_topology, &settings);
+        let (count, light_count) = (topology.vertices.len(), world.light_count as usize);
+        let light_words = 6 * 3 + 1 + light_count + settings.emitter_samples.div_ceil(32) as usize + 1;
+        let ray_bytes = BATCH_RAYS * (size_of::<Ray>() + 4) * usize::from(light_count > 0);
+        let needed = sizes.bytes()
+            + Elements::bytes_needed(&topology)
+            + Quadtrees::bytes_needed(&tree_topology)
+            + (4 * count * light_words + ray_bytes) as u64;
+        let (available, elements) = (context.available_bytes(), count as u64);
+        if needed > available {
+            return Err(ImplicitError::OutOfMemory { needed, available, elements, bins: settings.bin_count() });
+        }
+
+        let elements = Elements::new(context, topology, rest_positions, world, settings.ray_offset)?;
+        let trees = Quadtrees::new(context, tree_topology)?;
+        let (choice, samples) = (settings.emitters, settings.emitter_samples);
+        let emitters = Emitters::new(context, geometry, rest_positions, &elements, choice, samples)?;
+        let linking = Linking::new(context, &trees, &settings, sizes)?;
+        let state = State::new(context, &elements, &trees, world.light_count)?;
+        let n = settings.bins;
+        Ok(Self {
+            report: Report::new(&settings, &charts, &elements, &trees, &linking),
+            charts,
+            elements,
+            trees,
+            emitters,
+            linking,
+            state,
+            environment: WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?,
+            bin_radiance: context.upload("implicit/bin radiance", &bins::radiance(environment, n))?,
+            settings,
+        })
+    }
+
+    /// Follows the world's present places: all that Algorithm 1 does for a frame but the light.        [Dong2007 4.2]
+    pub fn link(&mut self, context: &Context, stage: &Stage<'_>) -> Result<(), ImplicitError> {
+        let world = stage.world;
+        let mut recorder = context.recorder("implicit-visibility")?;
+        recorder.scope("update elements", |recorder| {
+            self.elements.place(recorder, world);
+            self.elements.update_materials(recorder, world);
+            self.trees.pull_surfels(recorder, &self.elements, world); // UpdateElements
+            self.place_receivers(recorder, world);
+        });
+        recorder.submit()?;
+
+        // CreateHierarchicalLinks, RefineHierarchicalLinks, PushdownLinks
+        let counts = self.linking.link(context, &self.trees, &self.settings, stage.watch)?;
+        self.report.pairs_visited = counts.pairs_visited;
+        self.report.pairs_linked = counts.pairs_linked;
+
+        let mut recorder = context.recorder("implicit-visibility")?;
+        recorder.scope("see lights", |recorder| {
+            self.count_backs(recorder);
+            self.see_emitters(recorder, world);
+            let State { rays, is_free, visibility, .. } = &self.state;
+            self.report.light_rays =
+                punctual::trace_visibility(recorder, &stage.tracer, world, &self.elements, rays, is_free, visibility);
+        });
+        Ok(recorder.submit()?)
+    }
+
+    fn place_receivers(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let elements = &self.elements;
+        let leaf_count = self.trees.topology.leaf_count();
+        let pass = passes::Receivers {
+            leaf_elements: &self.trees.leaf_elements,
+            ray_origins: &elements.ray_origins,
+            element_normals: &elements.normals,
+            element_vertices: &elements.vertices,
+            positions: &world.positions,
+            triangles: &world.triangles,
+            incident_offsets: &elements.incident_offsets,
+            incident_triangles: &elements.incident_triangles,
+            receivers: &self.linking.receivers,
+            params: passes::ReceiversParams {
+                leaf_count,
+                follows_surface: u32::from(self.settings.frames == Frames::Surface),
+                spin: self.settings.spin.to_radians(),
+            },
+        };
+        recorder.dispatch(&pass, leaf_count);
+    }
+
+    fn count_backs(&self, recorder: &mut Recorder<'_>) {
+        recorder.fill(&self.state.outcomes, 0);
+        for window in &self.linking.windows {
+            let leaves = window.plan.leaves();
+            let pass = passes::CountBacks {
+                winners: &window.winners,
+                receivers: &self.linking.receivers,
+                leaf_elements: &self.trees.leaf_elements,
+                bin_vectors: &self.linking.bin_vectors,
+                outcomes: &self.state.outcomes,
+                params: passes::CountBacksParams {
+                    first_leaf: leaves.start,
+                    leaf_count: leaves.len() as u32,
+                    bin_count: self.settings.bin_count(),
+                },
+            };
+            recorder.dispatch(&pass, leaves.len());
+        }
+    }
+
+    /// Which points on sampled emitters each element sees, by its bins.
+    fn see_emitters(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let sample_count = self.emitters.plan.samples.len() as u32;
+        if sample_count == 0 {
+            return;
+        }
+        recorder.fill(&self.emitters.visible, 0);
+        for window in &self.linking.windows {
+            let leaves = window.plan.leaves();
+            let pass = passes::SeeEmitters {
+                winners: &window.winners,
+                receivers: &self.linking.receivers,
+                leaf_elements: &self.trees.leaf_elements,
+                surfels: &self.trees.surfels,
+                samples: &self.emitters.samples,
+                triangles: &world.triangles,
+                positions: &world.positions,
+                visible: &self.emitters.visible,
+                params: passes::SeeEmittersParams {
+                    first_leaf: leaves.start,
+                    leaf_count: leaves.len() as u32,
+                    n: self.settings.bins,
+                    sample_count,
+                },
+            };
+            recorder.dispatch(&pass, leaves.len() * sample_count.div_ceil(32) as usize);
+        }
+    }
+
+    /// Another environment; links stay.
+    pub fn set_environment(&mut self, context: &Context, environment: &Environment) -> Result<(), GpuError> {
+        let n = self.settings.bins;
+        self.environment = WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?;
+        self.bin_radiance = context.upload("implicit/bin radiance", &bins::radiance(environment, n))?;
+        Ok(())
+    }
+
+    /// Takes over the world's present materials; links stay. Emission may change as long as the same parts emit in
+    /// about the same proportion.
+    pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
+        self.elements.update_materials(recorder, world);
+    }
+
+    /// The light of direct illumination and `bounces` more.                                     [Dong2007 4.3]
+    pub fn solve(&self, recorder: &mut Recorder<'_>, world: &World, bounces: u32) {
+        let (elements, s) = (&self.elements, &self.state);
+        recorder.scope("direct", |recorder| self.direct_light(recorder, world));
+        elements.reflect(recorder, &s.irradiance, &s.radiosity);
+
+        recorder.fill(&s.indirect, 0);
+        for bounce in 1..=bounces {
+            recorder.scope(format_args!("bounce {bounce}"), |recorder| {
+                self.gather(recorder); // PullupEnergy, ComputeIlluminateLeafNodes: Eq. 5
+                elements.add(recorder, &s.irradiance, &s.indirect);
+                elements.reflect(recorder, &s.irradiance, &s.radiosity);
+            });
+        }
+        if self.settings.smoothing {
+            elements.smooth(recorder, self.settings.feature_angle.to_radians(), &s.indirect, &s.smoothed);
+        }
+    }
+
+    /// Irradiance that was not reflected before: by kind, and the sum in `irradiance`.
+    fn direct_light(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let (elements, s) = (&self.elements, &self.state);
+        punctual::irradiance(recorder, world, elements, &s.visibility, &s.punctual);
+        self.fill_unresolved(recorder, &s.punctual);
+
+        self.emitters.irradiance(recorder, world, elements, &s.direct);
+        if self.emitters.plan.linked_parts > 0 {
+            let pass = EmittedRadiosity {
+                emission: &elements.emission,
+                is_sampled: &self.emitters.is_sampled,
+                radiosity: &s.radiosity,
+                params: EmittedRadiosityParams { element_count: elements.count },
+            };
+            recorder.dispatch(&pass, elements.count);
+            self.gather(recorder);
+            elements.add(recorder, &s.irradiance, &s.direct);
+        }
+        if self.environment.info.is_black == 0 {
+            self.gather_environment(recorder);
+            elements.add(recorder, &s.irradiance, &s.direct);
+        }
+        self.fill_unresolved(recorder, &s.direct);
+
+        recorder.copy(&s.direct, &s.irradiance);
+        elements.add(recorder, &s.punctual, &s.irradiance);
+    }
+
+    /// `irradiance` of all elements from their winners' `radiosity`.
+    fn gather(&self, recorder: &mut Recorder<'_>) {
+        let s = &self.state;
+        self.trees.pull_radiosity(recorder, &s.radiosity, &s.node_radiosity);
+        recorder.fill(&s.irradiance, 0);
+        for window in &self.linking.windows {
+            let leaves = window.plan.leaves();
+            let pass = passes::Gather {
+                winners: &window.winners,
+                receivers: &self.linking.receivers,
+                leaf_elements: &self.trees.leaf_elements,
+                bin_vectors: &self.linking.bin_vectors,
+                surfels: &self.trees.surfels,
+                node_radiosity: &s.node_radiosity,
+                irradiance: &s.irradiance,
+                constants: passes::GatherConstants { is_paper: u32::from(self.settings.transport == Transport::Disc) },
+                params: passes::GatherParams {
+                    first_leaf: leaves.start,
+                    leaf_count: leaves.len() as u32,
+                    bin_count: self.settings.bin_count(),
+                    is_bounded: u32::from(self.settings.footprint() == Footprint::Single),
+                },
+            };
+            recorder.dispatch(&pass, leaves.len());
+        }
+        self.fill_unresolved(recorder, &s.irradiance);
+    }
+
+    /// `irradiance` of all elements from the environment through their empty bins.               [Dong2007 4.4]
+    fn gather_environment(&self, recorder: &mut Recorder<'_>) {
+        recorder.fill(&self.state.irradiance, 0);
+        for window in &self.linking.windows {
+            let leaves = window.plan.leaves();
+            let pass = passes::Environment {
+                winners: &window.winners,
+                receivers: &self.linking.receivers,
+                leaf_elements: &self.trees.leaf_elements,
+                bin_vectors: &self.linking.bin_vectors,
+                bin_radiance: &self.bin_radiance,
+                environment_info: &self.environment.info_buffer,
+                environment_map: Sampled { image: &self.environment.map, sampler: &self.environment.sampler },
+                irradiance: &self.state.irradiance,
+                params: passes::EnvironmentParams {
+                    first_leaf: leaves.start,
+                    leaf_count: leaves.len() as u32,
+                    n: self.settings.bins,
+                    is_turned: u32::from(self.settings.frames != Frames::World || self.settings.spin != 0.0),
+                },
+            };
+            recorder.dispatch(&pass, leaves.len());
+        }
+    }
+
+    /// Elements inside other things take over their neighbours' light.
+    fn fill_unresolved(&self, recorder: &mut Recorder<'_>, irradiance: &Buffer<Vec3>) {
+        let pass = FillUnresolved {
+            outcomes: &self.state.outcomes,
+            ring_offsets: &self.elements.ring_offsets,
+            ring: &self.elements.ring,
+            element_normals: &self.elements.normals,
+            irradiance,
+            params: FillUnresolvedParams { element_count: self.elements.count, ray_count: 1000 },
+        };
+        recorder.dispatch(&pass, self.elements.count);
+    }
+
+    /// Per vertex: the element of its back, u32::MAX where the surface is one-sided.
+    pub fn back_elements(&self) -> &Buffer<u32> {
+        &self.elements.back_elements
+    }
+
+    /// Sum over bounces, smoothed if the settings say so; W/m2 per element.
+    pub fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        if self.settings.smoothing { &self.state.smoothed } else { &self.state.indirect }
+    }
+
+    /// From emitters and the environment, unreflected; W/m2 per element.
+    pub fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.direct
+    }
+
+    /// From punctual lights, unreflected; W/m2 per element.
+    pub fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.punctual
+    }
+
+    /// Of the last bounce alone, unsmoothed; W/m2 per element. All direct light after a solve without bounces.
+    pub fn last_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.irradiance
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub fn elements(&self) -> &Elements {
+        &self.elements
+    }
+
+    pub fn trees(&self) -> &Quadtrees {
+        &self.trees
+    }
+
+    pub fn linking(&self) -> &Linking {
+        &self.linking
+    }
+
+    /// What was counted when the links were last made.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+impl State {
+    fn new(context: &Context, elements: &Elements, trees: &Quadtrees, light_count: u32) -> Result<Self, GpuError> {
+        let count = elements.count as usize;
+        // A single element's shadow rays to one light fit in any case.
+        let rays = if light_count > 0 { BATCH_RAYS } else { 0 };
+        Ok(Self {
+            radiosity: context.buffer("implicit/radiosity", count)?,
+            node_radiosity: context.buffer("implicit/node radiosity", trees.topology.node_count() as usize)?,
+            irradiance: context.buffer("implicit/irradiance", count)?,
+            punctual: context.buffer("implicit/punctual", count)?,
+            direct: context.buffer("implicit/direct", count)?,
+            indirect: context.buffer("implicit/indirect", count)?,
+            smoothed: context.buffer("implicit/smoothed", count)?,
+            outcomes: context.buffer("implicit/outcomes", count)?,
+            visibility: context.buffer("implicit/visibility", count * light_count as usize)?,
+            rays: context.buffer("implicit/shadow rays", rays)?,
+            is_free: context.buffer("implicit/is free", rays)?,
+        })
+    }
+}

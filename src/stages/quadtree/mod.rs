@@ -1,0 +1,94 @@
+//! Quadtrees of surfels over the elements, one per chart: the hierarchy that links are made on.
+//!
+//! Their shape is made once ([`topology`]); places, normals, bounds and light are pulled up from the leaves whenever they
+//! change, so that anything may deform.                                                           [Dong2007]
+//!
+//! [Dong2007]: crate::methods::PAPERS
+
+pub mod topology;
+
+use super::elements::Elements;
+use super::world::World;
+use crate::gpu::shaders::quadtree as passes;
+use crate::gpu::shaders::types::{QuadtreeSegment, Surfel, SurfelMoments};
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use glam::Vec3;
+use topology::QuadtreeTopology;
+
+/// The trees on the device. A node is a leaf exactly where its index is below [`QuadtreeTopology::leaf_count`].
+pub struct Quadtrees {
+    pub topology: QuadtreeTopology,
+    pub leaf_elements: Buffer<u32>,
+    pub node_segments: Buffer<u32>,
+    pub segments: Buffer<QuadtreeSegment>,
+    /// One per node.
+    pub surfels: Buffer<Surfel>,
+    moments: Buffer<SurfelMoments>,
+}
+
+impl Quadtrees {
+    /// Uploads the topology; [`Self::pull_surfels`] places the nodes.
+    pub fn new(context: &Context, topology: QuadtreeTopology) -> Result<Self, GpuError> {
+        let count = topology.node_count() as usize;
+        Ok(Self {
+            leaf_elements: context.upload("quadtree/leaf elements", &topology.leaf_elements)?,
+            node_segments: context.upload("quadtree/node segments", &topology.node_segments)?,
+            segments: context.upload("quadtree/segments", &topology.segments)?,
+            surfels: context.buffer("quadtree/surfels", count)?,
+            moments: context.buffer("quadtree/moments", count)?,
+            topology,
+        })
+    }
+
+    /// Bytes of the tables of [`Self::new`].
+    pub fn bytes_needed(topology: &QuadtreeTopology) -> u64 {
+        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + size_of::<u32>();
+        u64::from(topology.node_count()) * node as u64
+            + u64::from(topology.leaf_count()) * 4
+            + (topology.segments.len() * size_of::<QuadtreeSegment>()) as u64
+    }
+
+    /// Follows the elements' present places: leaves, then level by level.                          [Dong2007 4.2.1]
+    pub fn pull_surfels(&self, recorder: &mut Recorder<'_>, elements: &Elements, world: &World) {
+        let leaf_count = self.topology.leaf_count();
+        let pass = passes::LeafSurfels {
+            leaf_elements: &self.leaf_elements,
+            element_vertices: &elements.vertices,
+            element_normals: &elements.normals,
+            positions: &world.positions,
+            triangles: &world.triangles,
+            incident_offsets: &elements.incident_offsets,
+            incident_triangles: &elements.incident_triangles,
+            surfels: &self.surfels,
+            moments: &self.moments,
+            params: passes::LeafSurfelsParams { leaf_count },
+        };
+        recorder.dispatch(&pass, leaf_count);
+        for level in self.topology.levels.iter().skip(1) {
+            let pass = passes::PullSurfels {
+                node_segments: &self.node_segments,
+                segments: &self.segments,
+                surfels: &self.surfels,
+                moments: &self.moments,
+                params: passes::PullSurfelsParams { first: level.start, count: level.len() as u32 },
+            };
+            recorder.dispatch(&pass, level.len());
+        }
+    }
+
+    /// Radiosity of all nodes from that of the elements, W/m2.                                     [Dong2007 4.3]
+    pub fn pull_radiosity(&self, recorder: &mut Recorder<'_>, radiosity: &Buffer<Vec3>, node_radiosity: &Buffer<Vec3>) {
+        for level in &self.topology.levels {
+            let pass = passes::PullRadiosity {
+                node_segments: &self.node_segments,
+                segments: &self.segments,
+                surfels: &self.surfels,
+                leaf_elements: &self.leaf_elements,
+                radiosity,
+                node_radiosity,
+                params: passes::PullRadiosityParams { first: level.start, count: level.len() as u32 },
+            };
+            recorder.dispatch(&pass, level.len());
+        }
+    }
+}
