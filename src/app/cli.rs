@@ -5,10 +5,12 @@ use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
+use super::compare::Variation;
 use super::console::Verbosity;
 use super::diff::Limit;
 use super::values::{
-    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_method, parse_size,
+    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction, parse_method,
+    parse_size,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -59,6 +61,8 @@ impl Global {
 pub enum Command {
     /// Render a scene into a picture
     Render(Box<RenderArgs>),
+    /// Hold methods and settings to the reference: error, energy, time and memory as a page that opens from disk
+    Compare(CompareArgs),
     /// Print how far picture A is from reference B
     Diff(DiffArgs),
     /// List the GPUs, usable or not, and what they offer
@@ -181,6 +185,49 @@ pub enum Channel {
     Normal,
     /// depth.Z: distance from the camera along the pixel's ray, metres
     Depth,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// .gltf or .glb files, or builtin:NAME
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<SceneSource>,
+    /// Folder of the page, the data and the pictures; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Method, see `linklight methods`; may be repeated [default: all but path-tracing]
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub method: Vec<&'static Method>,
+    /// A method's setting or an option of `render`, by every value; may be repeated for all combinations
+    #[arg(long, value_name = "NAME=VALUE,...")]
+    pub vary: Vec<Variation>,
+    /// A setting, for every method that has it; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// Compare with this picture [default: path-traced, and kept in DIR for the next time]
+    #[arg(long, value_name = "FILE.exr")]
+    pub reference: Option<PathBuf>,
+    /// Trace the reference until the standard error of a pixel is this fraction of the picture's mean
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.02, value_parser = parse_fraction, conflicts_with = "reference")]
+    pub noise: f64,
+    /// Paths per pixel at which the reference ends all the same
+    #[arg(long, value_name = "N", default_value_t = 4096, value_parser = clap::value_parser!(u32).range(2..=1_048_576))]
+    pub reference_spp: u32,
+    /// Paths per pixel up to which path tracing is drawn beside the methods; 0 leaves it out
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=65_536))]
+    pub curve_spp: u32,
+    /// Frames that are timed
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub frames: u32,
+    /// Print the data of the page (DIR/compare.json) as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Fail (exit code 1) if a figure of any picture is above this limit, as in `linklight diff`; may be repeated
+    #[arg(long, value_name = "FIGURE=LIMIT")]
+    pub fail_above: Vec<Limit>,
+    /// Options of `linklight render` for all pictures, such as -- --size 480x270 --bounces 2
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    pub options: Vec<String>,
 }
 
 #[derive(Debug, Args)]

@@ -16,16 +16,16 @@ use crate::report::tonemap::ToneSettings;
 use crate::report::{heat_map, write};
 
 /// A figure of the listing, by the name that `--fail-above` takes.
-struct Figure {
-    name: &'static str,
-    doc: &'static str,
+pub struct Figure {
+    pub name: &'static str,
+    pub doc: &'static str,
     /// As printed; `None` is undefined.
-    value: fn(&ErrorFigures) -> Option<f64>,
+    pub value: fn(&ErrorFigures) -> Option<f64>,
     /// What a limit is held against: 0 is perfect, more is worse.
     error: fn(&ErrorFigures) -> Option<f64>,
 }
 
-const FIGURES: [Figure; 7] = [
+pub const FIGURES: [Figure; 7] = [
     Figure { name: "rmse", doc: "root mean square error of radiance", value: rmse, error: rmse },
     Figure { name: "relmse", doc: "relative mean square error", value: |f| f.relative_mse, error: |f| f.relative_mse },
     Figure {
@@ -134,11 +134,11 @@ fn read(path: &Path, layer: Option<&str>) -> Result<Picture, AppError> {
 }
 
 /// An undefined figure (black reference) is above every limit: it is never good.
-fn is_above(limit: &Limit, figures: &ErrorFigures) -> bool {
+pub fn is_above(limit: &Limit, figures: &ErrorFigures) -> bool {
     (FIGURES[limit.figure].error)(figures).is_none_or(|error| error > limit.limit)
 }
 
-fn complaint(limit: &Limit, figures: &ErrorFigures) -> String {
+pub fn complaint(limit: &Limit, figures: &ErrorFigures) -> String {
     let figure = &FIGURES[limit.figure];
     match (figure.error)(figures) {
         Some(error) => format!("{} {} is above {}", figure.name, number(Some(error)), limit.limit),
@@ -146,7 +146,7 @@ fn complaint(limit: &Limit, figures: &ErrorFigures) -> String {
     }
 }
 
-fn number(value: Option<f64>) -> String {
+pub fn number(value: Option<f64>) -> String {
     match value {
         None => "undefined".to_owned(),
         Some(value) if value != 0.0 && !(1e-4..1e6).contains(&value.abs()) => format!("{value:.5e}"),

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use super::AppError;
 use super::measure;
 use super::render::RenderRequest;
-use super::values::{Format, SceneSource};
+use super::values::Format;
 use crate::gpu;
 use crate::report::image::{self, Metadata, Picture};
 use crate::report::profile::{Profile, SceneFacts};
@@ -72,13 +72,9 @@ pub fn write_measurements(
 }
 
 fn metadata(request: &RenderRequest, device: &gpu::DeviceInfo) -> Result<Metadata, AppError> {
-    let scene = match &request.scene {
-        SceneSource::File(path) => path.display().to_string(),
-        SceneSource::Builtin(name) => format!("builtin:{name}"),
-    };
     let facts = [
         ("Software", format!("linklight {}", env!("CARGO_PKG_VERSION"))),
-        ("scene", scene),
+        ("scene", request.scene.to_string()),
         ("device", format!("{} ({})", device.name, device.driver)),
         ("settings", json!(request.record()?).to_string()),
     ];

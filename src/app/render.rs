@@ -227,14 +227,7 @@ pub fn run(
         prepare_capture()?;
     }
     let time_line = TimeLine::default();
-    let options = Options {
-        gpu: global.gpu.clone(),
-        validation: global.validate,
-        statistics: request.profile.is_some(),
-        pipeline_cache: pipeline_cache(),
-        ..Options::default()
-    };
-    let context = time_line.span("open device", || Context::new(options))?;
+    let context = time_line.span("open device", || open_device(global, request.profile.is_some()))?;
     let mut capture = request.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
     interrupt.check()?;
     let stage = Stage::new(&context, request, &time_line)?;
@@ -261,6 +254,23 @@ pub fn run(
     } else {
         output::write_measurements(request, measured, &mut io::sink())?;
     }
+    check_validation(&context)
+}
+
+/// The device of the global options; `statistics` counts what each pass does.
+pub fn open_device(global: &Global, statistics: bool) -> Result<Context, AppError> {
+    let options = Options {
+        gpu: global.gpu.clone(),
+        validation: global.validate,
+        statistics,
+        pipeline_cache: pipeline_cache(),
+        ..Options::default()
+    };
+    Ok(Context::new(options)?)
+}
+
+/// Fails where validation had anything to say.
+pub fn check_validation(context: &Context) -> Result<(), AppError> {
     let messages = context.validation_messages();
     match messages.first() {
         None => Ok(()),

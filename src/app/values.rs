@@ -1,5 +1,6 @@
 //! Values of the command line that are more than a number or a path, each with its parser and its own complaints.
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -15,6 +16,15 @@ pub enum SceneSource {
     File(PathBuf),
     /// The name after `builtin:`, known to exist.
     Builtin(String),
+}
+
+impl fmt::Display for SceneSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::Builtin(name) => write!(f, "{}{name}", builtin::PREFIX),
+        }
+    }
 }
 
 impl FromStr for SceneSource {
@@ -113,6 +123,14 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// `--exposure`.
 pub fn parse_exposure(text: &str) -> Result<f32, String> {
     number_within(text, -32.0, 32.0, "stops")
+}
+
+/// A number above 0, at most 1.
+pub fn parse_fraction(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number > 0.0 && number <= 1.0 => Ok(number),
+        _ => Err("expected a number above 0, at most 1".to_owned()),
+    }
 }
 
 /// `--seconds`.

@@ -5,6 +5,8 @@
 //! | [`image`] | [`image::Picture`]: linear RGB with named channels; PNG, EXR and HDR files |
 //! | [`tonemap`] | scene-linear radiance to display bytes, the CPU twin of the display's last pass |
 //! | [`errors`] | how far a picture is from a reference: RMSE, relative MSE, energy, SSIM, FLIP |
+//! | [`compare_page`] | the page of `linklight compare` and its data |
+//! | [`plot`] | log-log plots as SVG |
 //! | [`profile`] | the `--profile` JSON file |
 //! | [`trace`] | the `--trace` file for Perfetto and `chrome://tracing` |
 //! | [`table`] | the table of passes printed at exit |
@@ -12,10 +14,12 @@
 //!
 //! Nothing here touches the GPU: timings arrive as plain [`profile::PassRecord`]s.
 
+pub mod compare_page;
 pub mod errors;
 mod exr_file;
 pub mod heat_map;
 pub mod image;
+pub mod plot;
 mod png_file;
 pub mod profile;
 mod ssim;

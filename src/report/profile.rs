@@ -234,7 +234,8 @@ fn summarise_calls(calls: &[&PassRecord]) -> Option<Pass> {
 }
 
 impl Milliseconds {
-    fn of(mut durations_ns: Vec<u64>) -> Self {
+    /// All zero where there are none.
+    pub fn of(mut durations_ns: Vec<u64>) -> Self {
         durations_ns.sort_unstable();
         let ms = |ns: u64| ns as f64 * 1e-6;
         let (Some(first), Some(last)) = (durations_ns.first(), durations_ns.last()) else { return Self::default() };
