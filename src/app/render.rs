@@ -228,6 +228,8 @@ pub fn run(
     }
     let time_line = TimeLine::default();
     let context = time_line.span("open device", || open_device(global, request.profile.is_some()))?;
+    let device = context.info();
+    tracing::info!("device {} {} ({})", device.index, device.name, device.driver);
     let mut capture = request.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
     interrupt.check()?;
     let stage = Stage::new(&context, request, &time_line)?;

@@ -69,7 +69,7 @@ impl Context {
             device.limits.storage_buffer_bytes = device.limits.storage_buffer_bytes.min(bytes);
         }
         let device = Arc::new(device);
-        tracing::info!("device {} {} ({})", device.info.index, device.info.name, device.info.driver);
+        tracing::debug!("device {} {} ({})", device.info.index, device.info.name, device.info.driver);
         let pipelines = Pipelines::new(&device, options.pipeline_cache.clone())?;
         Ok(Self {
             options,

@@ -14,9 +14,9 @@ use super::diff::{complaint, is_above, number};
 use super::interrupt::Interrupt;
 use super::values::SceneSource;
 use super::{measure, render};
-use crate::methods::METHODS;
+use crate::methods::{self, METHODS, Method};
 use crate::report::compare_page::{
-    CurvePoint, Done, Outcome, ReferenceReport, Report, RunReport, SCHEMA, SceneReport, VERSION, to_html,
+    CurvePoint, Done, MethodReport, Outcome, ReferenceReport, Report, RunReport, SCHEMA, SceneReport, VERSION, to_html,
 };
 use crate::report::errors::compare;
 use crate::report::image::{self, Metadata, Picture};
@@ -55,6 +55,7 @@ pub fn run(
         [] => METHODS.iter().filter(|method| method.key != REFERENCE).collect(),
         chosen => chosen.to_vec(),
     };
+    let described = method_reports(&methods);
     let plan = Plan { methods, variations: &args.vary, set: &args.set, options: &args.options };
     plan.check()?;
     let folders = folders(&args.output, &args.scenes)?;
@@ -67,7 +68,8 @@ pub fn run(
     let session = Session { args, global, watch: Watcher::new(console, interrupt), tone };
 
     let device = measure::device(render::open_device(global, false)?.info());
-    let mut report = Report { schema: SCHEMA, version: VERSION, program: PROGRAM, device, scenes: Vec::new() };
+    let mut report =
+        Report { schema: SCHEMA, version: VERSION, program: PROGRAM, device, methods: described, scenes: Vec::new() };
     let mut complaints = Vec::new();
     for ((reference, runs), folder) in work.into_iter().zip(&folders) {
         session.scene(&reference, runs, folder, &mut report, &mut complaints)?;
@@ -82,6 +84,22 @@ pub fn run(
 }
 
 const PROGRAM: &str = concat!("linklight ", env!("CARGO_PKG_VERSION"));
+
+/// Those compared and the reference, each once.
+fn method_reports(compared: &[&'static Method]) -> Vec<MethodReport> {
+    let mut methods: Vec<&Method> = Vec::new();
+    for method in compared.iter().copied().chain(methods::find(REFERENCE)) {
+        if methods.iter().all(|other| other.key != method.key) {
+            methods.push(method);
+        }
+    }
+    let describe = |method: &&Method| {
+        let paper = method.paper;
+        let source = format!("{}. {}. {}, {}.", paper.authors, paper.title, paper.venue, paper.year);
+        MethodReport { key: method.key, summary: method.summary, source, doi: paper.doi }
+    };
+    methods.iter().map(describe).collect()
+}
 
 /// A folder for the pictures of each scene, made when missing: named for the scene, and numbered where two are alike.
 fn folders(output: &Path, scenes: &[SceneSource]) -> Result<Vec<PathBuf>, AppError> {

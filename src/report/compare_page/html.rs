@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Done, Outcome, Report, RunReport, SceneReport};
+use super::{Done, MethodReport, Outcome, Report, RunReport, SceneReport};
 use crate::report::plot::{Series, escaped, log_log};
 
 /// Passes listed under a picture: the ones that take longest.
@@ -24,6 +24,7 @@ pub fn to_html(report: &Report) -> String {
     html += "<p>One tone curve for each scene, fitted to its reference. Times are of the second preparation and of frames \
              after the first. Energy is the mean of the picture over the mean of the reference. Click a heading to sort, a \
              picture to flip between it and the reference.</p>\n";
+    html += &methods(report);
     html += &table(report);
     for scene in &report.scenes {
         html += &scene_section(scene);
@@ -38,6 +39,20 @@ fn cell(html: &mut String, value: Option<f64>, digits: usize) {
         Some(value) => write!(html, "<td data-value=\"{value}\">{}</td>", number(value, digits)),
         None => write!(html, "<td data-value=\"\">&ndash;</td>"),
     };
+}
+
+/// The methods compared, with their papers.
+fn methods(report: &Report) -> String {
+    let mut html = String::from("<div class=\"scroll\"><table class=\"words\">\n<thead><tr><th>method</th>");
+    html += "<th>what carries the light</th><th>source</th></tr></thead>\n<tbody>\n";
+    for MethodReport { key, summary, source, doi } in &report.methods {
+        let source = match doi {
+            Some(doi) => format!("<a href=\"https://doi.org/{}\">{}</a>", escaped(doi), escaped(source)),
+            None => escaped(source),
+        };
+        let _ = writeln!(html, "<tr><td>{key}</td><td>{}</td><td>{source}</td></tr>", escaped(summary));
+    }
+    html + "</tbody></table></div>\n"
 }
 
 fn table(report: &Report) -> String {

@@ -25,7 +25,19 @@ pub struct Report {
     pub version: u32,
     pub program: &'static str,
     pub device: Device,
+    /// Compared, and the reference.
+    pub methods: Vec<MethodReport>,
     pub scenes: Vec<SceneReport>,
+}
+
+/// A method in words.
+#[derive(Debug, Clone, Serialize)]
+pub struct MethodReport {
+    pub key: &'static str,
+    pub summary: &'static str,
+    /// Authors, title and where it was published.
+    pub source: String,
+    pub doi: Option<&'static str>,
 }
 
 /// One scene by every method.
