@@ -10,6 +10,7 @@
 pub mod adjacency;
 pub mod alias;
 pub mod animation;
+pub mod atlas;
 pub mod builtin;
 pub mod camera;
 pub mod charts;

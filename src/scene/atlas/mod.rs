@@ -1,0 +1,268 @@
+//! The atlas: charts packed into a square, and the surface in it cut into texels.                  [Ritschel2008 4.1]
+//!
+//! A texel is whatever part of a chart lies in its square, however little: nothing is lost at the borders of charts, and
+//! the texels' areas, measured part by part, add up to the surface. A double-sided surface has texels on both sides.
+//!
+//! [Ritschel2008]: crate::methods::PAPERS
+
+mod pack;
+mod raster;
+
+use super::Scene;
+use super::charts::{Charts, Options, Surface, unwrap};
+use super::geometry::Geometry;
+use glam::{UVec2, Vec2, Vec3};
+use pack::Packing;
+
+/// "No texel" of an entry of [`Atlas::texel_at`].
+pub const NO_TEXEL: u32 = u32::MAX;
+/// Texels a side of the finest atlas.
+pub const MAX_RESOLUTION: u32 = 2048;
+
+/// Why a surface has no atlas.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum AtlasError {
+    #[error(
+        "{charts} charts do not fit into an atlas of {resolution} texels a side; {}",
+        match .fits { Some(fits) => format!("{fits} would do: set atlas_resolution={fits}"), None => "simplify the scene".into() }
+    )]
+    TooSmall { charts: usize, resolution: u32, fits: Option<u32> },
+}
+
+/// One texel with a surface in it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Texel {
+    /// Column and row in the atlas.
+    pub at: UVec2,
+    /// Chart; the back of chart `c` counts as `chart_count + c`.
+    pub chart: u32,
+    /// Centroid of the surface in the texel, metres.
+    pub position: Vec3,
+    /// Unit, of the surface itself, towards the texel's side.
+    pub normal: Vec3,
+    /// m2.
+    pub area: f32,
+    /// Sides of the parallelogram that stands for the texel, metres: as long as the area asks for.
+    pub side_u: Vec3,
+    pub side_v: Vec3,
+    /// First of its parts; the next texel's first ends them.
+    pub first_part: u32,
+}
+
+/// The part of one triangle in one texel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TexelPart {
+    pub triangle: u32,
+    /// Of its centroid: weights of corners 1 and 2.
+    pub barycentrics: Vec2,
+    /// m2.
+    pub area: f32,
+}
+
+/// The atlas as plain data.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Atlas {
+    /// Texels a side.
+    pub resolution: u32,
+    /// Texels per metre of chart.
+    pub scale: f32,
+    pub chart_count: u32,
+    /// Row by row.
+    pub texels: Vec<Texel>,
+    pub parts: Vec<TexelPart>,
+    /// Index of the texel at each place, row by row, or [`NO_TEXEL`].
+    pub texel_at: Vec<u32>,
+    /// Place of each triangle's corners in the atlas, texels: fronts, then backs (equal where the surface has none).
+    pub corner_places: [Vec<[Vec2; 3]>; 2],
+}
+
+impl Atlas {
+    /// Unwraps and cuts `geometry`, whose vertices stand at `positions`, into at most `resolution` texels a side.
+    pub fn new(scene: &Scene, geometry: &Geometry, positions: &[Vec3], resolution: u32) -> Result<Self, AtlasError> {
+        let charts = unwrap(&Surface::of(geometry, positions), &Options::default());
+        let has_back = |chart: usize| {
+            let part = geometry.parts[charts.charts[chart].part as usize];
+            scene.materials.get(part.material as usize).is_some_and(|material| material.double_sided)
+        };
+        let count = charts.charts.len();
+        let backs: Vec<usize> = (0..count).filter(|&chart| has_back(chart)).collect();
+        let sizes: Vec<Vec2> =
+            (0..count).chain(backs.iter().copied()).map(|chart| charts.charts[chart].size.max(Vec2::ZERO)).collect();
+        let packing = pack::pack(&sizes, resolution).ok_or_else(|| {
+            let finer = std::iter::successors(Some(resolution.max(1).next_power_of_two()), |r| Some(r * 2));
+            let fits = finer.take_while(|&r| r <= MAX_RESOLUTION).find(|&r| pack::pack(&sizes, r).is_some());
+            AtlasError::TooSmall { charts: sizes.len(), resolution, fits }
+        })?;
+        let mut back_of = vec![None; count];
+        for (index, &chart) in backs.iter().enumerate() {
+            back_of[chart] = Some(packing.places[count + index]);
+        }
+        Ok(Self::cut(geometry, positions, &charts, &packing, &back_of, resolution))
+    }
+
+    fn cut(
+        geometry: &Geometry,
+        positions: &[Vec3],
+        charts: &Charts,
+        packing: &Packing,
+        back_of: &[Option<UVec2>],
+        resolution: u32,
+    ) -> Self {
+        let count = charts.charts.len() as u32;
+        let mut atlas = Self { resolution, scale: packing.scale, chart_count: count, ..Self::default() };
+        // Sums per place of the square; a place belongs to one chart, since charts keep apart.
+        let mut found: Vec<(u32, u32, TexelPart)> = Vec::new();
+        for (triangle, corners) in geometry.triangles.iter().enumerate() {
+            let chart = charts.triangle_chart[triangle] as usize;
+            let [a, b, c] = corners.map(|v| positions[v as usize]);
+            let area = 0.5 * (b - a).cross(c - a).length();
+            let front = charts.corner_uv[triangle].map(|uv| uv * packing.scale + packing.places[chart].as_vec2());
+            let back =
+                back_of[chart].map(|place| charts.corner_uv[triangle].map(|uv| uv * packing.scale + place.as_vec2()));
+            atlas.corner_places[0].push(front);
+            atlas.corner_places[1].push(back.unwrap_or(front));
+            let sides = std::iter::once((front, chart as u32)).chain(back.map(|back| (back, count + chart as u32)));
+            for (places, chart) in sides {
+                let [p, q, r] = places;
+                let flat = (q - p).perp_dot(r - p);
+                if flat == 0.0 || area <= 0.0 {
+                    continue;
+                }
+                raster::cover(places, |covered| {
+                    let at = covered.texel.min(UVec2::splat(resolution - 1));
+                    let offset = covered.centre - p;
+                    let barycentrics = Vec2::new(offset.perp_dot(r - p), (q - p).perp_dot(offset)) / flat;
+                    let part = TexelPart {
+                        triangle: triangle as u32,
+                        barycentrics,
+                        area: covered.share / (0.5 * flat.abs()) * area,
+                    };
+                    found.push((at.y * resolution + at.x, chart, part));
+                });
+            }
+        }
+        found.sort_by_key(|&(place, ..)| place);
+
+        atlas.texel_at = vec![NO_TEXEL; resolution as usize * resolution as usize];
+        for parts in found.chunk_by(|a, b| a.0 == b.0) {
+            let (place, chart, _) = parts[0];
+            let is_back = chart >= count;
+            let texel =
+                texel(geometry, positions, &atlas, parts, is_back, UVec2::new(place % resolution, place / resolution));
+            if texel.area > 0.0 && texel.normal != Vec3::ZERO {
+                atlas.texel_at[place as usize] = atlas.texels.len() as u32;
+                atlas.texels.push(Texel { chart, first_part: atlas.parts.len() as u32, ..texel });
+                atlas.parts.extend(parts.iter().map(|&(.., part)| part));
+            }
+        }
+        atlas
+    }
+
+    /// Parts of a texel.
+    pub fn parts_of(&self, texel: usize) -> &[TexelPart] {
+        let end = self.texels.get(texel + 1).map_or(self.parts.len(), |next| next.first_part as usize);
+        &self.parts[self.texels[texel].first_part as usize..end]
+    }
+}
+
+/// Sums the parts up: area, centroid, mean normal, and the mean of what a step of a texel to the right and down is in
+/// space.
+fn texel(
+    geometry: &Geometry,
+    positions: &[Vec3],
+    atlas: &Atlas,
+    parts: &[(u32, u32, TexelPart)],
+    is_back: bool,
+    at: UVec2,
+) -> Texel {
+    let (mut area, mut position, mut normal, mut u, mut v) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    for (.., part) in parts {
+        let triangle = part.triangle as usize;
+        let [a, b, c] = geometry.triangles[triangle].map(|vertex| positions[vertex as usize]);
+        let [p, q, r] = atlas.corner_places[usize::from(is_back)][triangle];
+        let (e1, e2) = (q - p, r - p);
+        let flat = e1.perp_dot(e2);
+        area += part.area;
+        position += part.area * (a + part.barycentrics.x * (b - a) + part.barycentrics.y * (c - a));
+        normal += part.area * (b - a).cross(c - a).normalize_or_zero();
+        u += part.area * ((b - a) * e2.y - (c - a) * e1.y) / flat;
+        v += part.area * ((c - a) * e1.x - (b - a) * e2.x) / flat;
+    }
+    if !(area > 0.0) {
+        return Texel { at, chart: 0, position, normal: Vec3::ZERO, area: 0.0, side_u: u, side_v: v, first_part: 0 };
+    }
+    let normal = if is_back { -normal } else { normal }.normalize_or_zero();
+    // Sides in the plane across the normal, around it the right way, as large as the area.
+    let [u, v] = [u, v].map(|side| (side - normal * side.dot(normal)) / area);
+    let across = u.cross(v).dot(normal);
+    let (u, v) = if across < 0.0 { (v, u) } else { (u, v) };
+    let (side_u, side_v) = if across.abs() > 1e-3 * u.length() * v.length() && across.is_finite() {
+        let factor = (area / across.abs()).sqrt();
+        (factor * u, factor * v)
+    } else {
+        let (u, v) = normal.any_orthonormal_pair();
+        (area.sqrt() * u, area.sqrt() * v)
+    };
+    Texel { at, chart: 0, position: position / area, normal, area, side_u, side_v, first_part: 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::pose::Pose;
+    use crate::scene::{LoadOptions, builtin, deform};
+
+    fn atlas(name: &str, resolution: u32) -> (Atlas, f32) {
+        let scene = builtin::open(name, &LoadOptions::default()).unwrap();
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|v| positions[v as usize]);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        let atlas = Atlas::new(&scene, &geometry, &positions, resolution).unwrap();
+        let sides = |t: usize| 1.0 + f32::from(u8::from(atlas.corner_places[0][t] != atlas.corner_places[1][t]));
+        let total = geometry.triangles.iter().enumerate().map(|(t, v)| sides(t) * area(v)).sum();
+        (atlas, total)
+    }
+
+    #[test]
+    fn areas_add_up_to_the_surface() {
+        for (name, resolution) in [("builtin:cornell-box", 64), ("builtin:cornell-box", 128), ("builtin:maze", 128)] {
+            let (atlas, total) = atlas(name, resolution);
+            let sum: f32 = atlas.texels.iter().map(|texel| texel.area).sum();
+            println!(
+                "{name} at {resolution}: {} texels, {} charts, {sum} m2 of {total}",
+                atlas.texels.len(),
+                atlas.chart_count
+            );
+            assert!((sum / total - 1.0).abs() < 1e-3, "{sum} for {total}");
+            for (index, texel) in atlas.texels.iter().enumerate() {
+                let across = texel.side_u.cross(texel.side_v);
+                assert!((across.length() / texel.area - 1.0).abs() < 1e-3, "{texel:?}");
+                assert!(across.normalize().dot(texel.normal) > 0.999, "{texel:?}");
+                let parts: f32 = atlas.parts_of(index).iter().map(|part| part.area).sum();
+                assert!((parts / texel.area - 1.0).abs() < 1e-4);
+                assert_eq!(atlas.texel_at[(texel.at.y * resolution + texel.at.x) as usize], index as u32);
+            }
+            // Neighbours in the square belong to one chart.
+            for texel in &atlas.texels {
+                let right = atlas.texel_at[(texel.at.y * resolution + texel.at.x + 1) as usize];
+                assert!(right == NO_TEXEL || atlas.texels[right as usize].chart == texel.chart);
+            }
+        }
+    }
+
+    #[test]
+    fn an_atlas_too_small_says_what_would_do() {
+        let scene = builtin::open("builtin:office", &LoadOptions::default()).unwrap();
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
+        let error = Atlas::new(&scene, &geometry, &positions, 16).unwrap_err();
+        println!("{error}");
+        let AtlasError::TooSmall { fits: Some(fits), .. } = error else { panic!("{error}") };
+        let atlas = Atlas::new(&scene, &geometry, &positions, fits).unwrap();
+        println!("office at {fits}: {} texels, {} charts", atlas.texels.len(), atlas.chart_count);
+        assert!(error.to_string().contains(&format!("atlas_resolution={fits}")));
+    }
+}
