@@ -15,6 +15,7 @@ pub mod punctual;
 pub mod quadtree;
 pub mod scan;
 pub mod sender_tree;
+pub mod surface_maps;
 pub mod trace;
 pub mod view;
 pub mod work;

@@ -1,0 +1,249 @@
+//! Orders in which the texels of an atlas are visited: neighbours in the order see nearly the same.  [Ritschel2008 3.2]
+//!
+//! [Ritschel2008]: crate::methods::PAPERS
+
+use crate::scene::atlas::{Atlas, NO_TEXEL, Texel};
+use glam::{UVec2, Vec3};
+use std::collections::HashMap;
+
+crate::choice! {
+    /// How the texels are walked.
+    pub enum Sequence {
+        /// From each texel to the nearest one left, charts or not
+        Greedy = "greedy",
+        /// Row by row in each chart, to and fro
+        ZigZag = "zig-zag",
+        /// Along the border of each chart and inwards, stepping back when stuck
+        Spiral = "spiral",
+    }
+}
+
+/// Indices of all texels, each once, in the order of the walk.
+pub fn walk(atlas: &Atlas, sequence: Sequence) -> Vec<u32> {
+    match sequence {
+        Sequence::Greedy => greedy(&atlas.texels),
+        Sequence::ZigZag => by_chart(atlas, zig_zag),
+        Sequence::Spiral => by_chart(atlas, spiral),
+    }
+}
+
+fn greedy(texels: &[Texel]) -> Vec<u32> {
+    let mut nearest = NearestLeft::new(texels.iter().map(|texel| texel.position).collect());
+    let mut order = Vec::with_capacity(texels.len());
+    let mut next = (!texels.is_empty()).then_some(0);
+    while let Some(texel) = next {
+        nearest.take(texel);
+        order.push(texel);
+        next = nearest.to(texels[texel as usize].position);
+    }
+    order
+}
+
+/// Walks chart after chart, each by `within` from the texel nearest to where the last one ended.
+fn by_chart(atlas: &Atlas, within: impl Fn(&Atlas, &[u32], u32, &mut Vec<u32>)) -> Vec<u32> {
+    let mut charts: HashMap<u32, Vec<u32>> = HashMap::new();
+    for (index, texel) in atlas.texels.iter().enumerate() {
+        charts.entry(texel.chart).or_default().push(index as u32);
+    }
+    let mut nearest = NearestLeft::new(atlas.texels.iter().map(|texel| texel.position).collect());
+    let mut order = Vec::with_capacity(atlas.texels.len());
+    let mut next = (!atlas.texels.is_empty()).then_some(0);
+    while let Some(first) = next {
+        let chart = &charts[&atlas.texels[first as usize].chart];
+        within(atlas, chart, first, &mut order);
+        chart.iter().for_each(|&texel| nearest.take(texel));
+        let last = order.last().map_or(Vec3::ZERO, |&texel| atlas.texels[texel as usize].position);
+        next = nearest.to(last);
+    }
+    order
+}
+
+/// Rows from the top, or from the bottom where the start is nearer to it, every other one backwards.
+fn zig_zag(atlas: &Atlas, chart: &[u32], first: u32, order: &mut Vec<u32>) {
+    let at = |texel: u32| atlas.texels[texel as usize].at;
+    let top = chart.iter().map(|&t| at(t).y).min().unwrap_or(0);
+    let bottom = chart.iter().map(|&t| at(t).y).max().unwrap_or(0);
+    let upwards = bottom - at(first).y < at(first).y - top;
+    let left = chart.iter().map(|&t| at(t).x).min().unwrap_or(0);
+    let right = chart.iter().map(|&t| at(t).x).max().unwrap_or(0);
+    let backwards = right - at(first).x < at(first).x - left;
+    let key = |&texel: &u32| {
+        let UVec2 { x, y } = at(texel);
+        let row = if upwards { bottom - y } else { y - top };
+        (row, if (row % 2 == 1) != backwards { u32::MAX - x } else { x })
+    };
+    let mut rows = chart.to_vec();
+    rows.sort_by_key(key);
+    order.extend(rows);
+}
+
+/// Keeps to the left what is outside or was visited; where all around was, goes back along its way to where it can
+/// turn off.
+fn spiral(atlas: &Atlas, chart: &[u32], first: u32, order: &mut Vec<u32>) {
+    let mut left: HashMap<u32, bool> = chart.iter().map(|&texel| (texel, true)).collect();
+    let neighbour = |texel: u32, heading: usize| -> Option<u32> {
+        let UVec2 { x, y } = atlas.texels[texel as usize].at;
+        let size = atlas.resolution;
+        let (x, y) = match heading % 4 {
+            0 => (x + 1, y),
+            1 => (x, y + 1),
+            2 => (x.wrapping_sub(1), y),
+            _ => (x, y.wrapping_sub(1)),
+        };
+        let index = (x < size && y < size).then(|| atlas.texel_at[(y * size + x) as usize])?;
+        (index != NO_TEXEL && atlas.texels[index as usize].chart == atlas.texels[texel as usize].chart).then_some(index)
+    };
+    // Texels in atlas order, for parts of a chart that touch nowhere.
+    let mut rest = chart.iter();
+    let mut start = Some(first);
+    while let Some(mut texel) = start {
+        let mut heading = (0..4).find(|&h| neighbour(texel, h + 3).is_none()).unwrap_or(0);
+        let mut way = Vec::new();
+        left.insert(texel, false);
+        order.push(texel);
+        loop {
+            // Left, ahead, right, back.
+            let turns = [3, 0, 1, 2].map(|turn| (heading + turn) % 4);
+            let free = turns.iter().find_map(|&h| neighbour(texel, h).filter(|n| left[n]).map(|n| (h, n)));
+            match free {
+                Some((taken, next)) => {
+                    way.push((texel, heading));
+                    heading = taken;
+                    texel = next;
+                    left.insert(texel, false);
+                    order.push(texel);
+                }
+                None => match way.pop() {
+                    Some((before, its_heading)) => (texel, heading) = (before, its_heading),
+                    None => break,
+                },
+            }
+        }
+        start = rest.find(|texel| left[*texel]).copied();
+    }
+}
+
+/// Finds the nearest of the points that were not taken yet, by a grid.
+struct NearestLeft {
+    points: Vec<Vec3>,
+    cells: HashMap<[i32; 3], Vec<u32>>,
+    cell: f32,
+    low: Vec3,
+    /// Cells a side.
+    extent: i32,
+    left: usize,
+}
+
+impl NearestLeft {
+    fn new(points: Vec<Vec3>) -> Self {
+        let (low, high) = points.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), &p| (low.min(p), high.max(p)));
+        let size = (high - low).max_element().max(f32::MIN_POSITIVE);
+        // Points lie on surfaces: a few to a cell.
+        let extent = ((points.len() as f32).sqrt() / 2.0).clamp(1.0, 256.0) as i32;
+        let cell = size / extent as f32;
+        let mut grid = Self { left: points.len(), points, cells: HashMap::new(), cell, low, extent };
+        for index in 0..grid.points.len() {
+            let key = grid.key(grid.points[index]);
+            grid.cells.entry(key).or_default().push(index as u32);
+        }
+        grid
+    }
+
+    fn key(&self, point: Vec3) -> [i32; 3] {
+        ((point - self.low) / self.cell).as_ivec3().clamp(glam::IVec3::ZERO, glam::IVec3::splat(self.extent)).to_array()
+    }
+
+    fn take(&mut self, index: u32) {
+        let key = self.key(self.points[index as usize]);
+        if let Some(cell) = self.cells.get_mut(&key)
+            && let Some(at) = cell.iter().position(|&other| other == index)
+        {
+            cell.remove(at);
+            self.left -= 1;
+            if cell.is_empty() {
+                self.cells.remove(&key);
+            }
+        }
+    }
+
+    /// The lowest index of the nearest points left.
+    fn to(&self, point: Vec3) -> Option<u32> {
+        let squared = |i: u32| self.points[i as usize].distance_squared(point);
+        let nearer = |a: u32, b: u32| if (squared(b), b) < (squared(a), a) { b } else { a };
+        let best_of = |cells: &mut dyn Iterator<Item = &Vec<u32>>| cells.flatten().copied().reduce(nearer);
+        // Few cells left: look at all of them, rather than at ever larger shells of empty ones.
+        if self.left < 64 || self.cells.len() < 64 {
+            return best_of(&mut self.cells.values());
+        }
+        let [x, y, z] = self.key(point);
+        let mut best: Option<u32> = None;
+        for shell in 0..=self.extent {
+            if best.is_some_and(|b| squared(b).sqrt() < (shell - 1) as f32 * self.cell) {
+                break;
+            }
+            let range = |c: i32| (c - shell).max(0)..=(c + shell).min(self.extent);
+            for i in range(x) {
+                for j in range(y) {
+                    for k in range(z) {
+                        if (i - x).abs().max((j - y).abs()).max((k - z).abs()) != shell {
+                            continue;
+                        }
+                        let found = best_of(&mut self.cells.get(&[i, j, k]).into_iter());
+                        best = best.into_iter().chain(found).reduce(nearer);
+                    }
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::geometry::Geometry;
+    use crate::scene::pose::Pose;
+    use crate::scene::{LoadOptions, builtin, deform};
+
+    fn cornell() -> Atlas {
+        let scene = builtin::open("builtin:cornell-box", &LoadOptions::default()).unwrap();
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
+        Atlas::new(&scene, &geometry, &positions, 64).unwrap()
+    }
+
+    #[test]
+    fn every_texel_is_visited_once_and_most_steps_are_short() {
+        let atlas = cornell();
+        for sequence in [Sequence::Greedy, Sequence::ZigZag, Sequence::Spiral] {
+            let order = walk(&atlas, sequence);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert!(sorted.iter().copied().eq(0..atlas.texels.len() as u32), "{sequence:?}");
+            assert_eq!(order, walk(&atlas, sequence));
+            let places: Vec<Vec3> = order.iter().map(|&t| atlas.texels[t as usize].position).collect();
+            let short = places.windows(2).filter(|pair| pair[0].distance(pair[1]) < 1.6 / atlas.scale).count();
+            println!("{sequence:?}: {short} of {} steps are short", order.len());
+            assert!(short * 10 > order.len() * 9, "{sequence:?}: {short} short steps");
+        }
+    }
+
+    #[test]
+    fn the_nearest_left_is_the_nearest() {
+        let atlas = cornell();
+        let points: Vec<Vec3> = atlas.texels.iter().map(|texel| texel.position).collect();
+        let mut grid = NearestLeft::new(points.clone());
+        let mut is_left = vec![true; points.len()];
+        for step in 0..400u32 {
+            let from = points[(step * 997) as usize % points.len()];
+            let found = grid.to(from).unwrap();
+            let best = (0..points.len())
+                .filter(|&i| is_left[i])
+                .map(|i| points[i].distance_squared(from))
+                .fold(f32::MAX, f32::min);
+            assert_eq!(points[found as usize].distance_squared(from), best);
+            grid.take(found);
+            is_left[found as usize] = false;
+        }
+    }
+}
