@@ -16,6 +16,7 @@ pub mod quadtree;
 pub mod scan;
 pub mod sender_tree;
 pub mod surface_maps;
+pub mod texels;
 pub mod trace;
 pub mod view;
 pub mod work;

@@ -1,4 +1,325 @@
-//! Coherent surface shadow maps.
+//! Coherent surface shadow maps: from every texel of an atlas, depth in all directions, compressed; whether a texel sees
+//! a point is a look-up.                                                                   [Ritschel2008 3]
+//!
+//! Two rays per pixel find the first surface and the next; any depth in between answers every query right. The texels
+//! are walked so that neighbours see nearly the same ([`sequence`]), and along the walk each pixel keeps one depth for as
+//! long as it holds. The maps are made chunk by chunk, can be interrupted between chunks, and are kept on disk.
+//!
+//! | paper | here | unit |
+//! |---|---|---|
+//! | sequence | place of a texel in the walk | – |
+//! | q | pixel of a cube map | – |
+//! | z | depth code: distance times `codes_per_metre` | 1 / 65534 of the scene's extent |
+//!
+//! What it does not do: it knows the pose it was made in, and nothing that moves against it.
+//!
+//! [Ritschel2008]: crate::methods::PAPERS
+
+mod cache;
 mod compress;
 pub mod sequence;
+
+pub use cache::{Found, Key};
 pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, Run};
+pub use sequence::Sequence;
+
+use super::trace::{self, Tracer};
+use super::work::{Interrupted, Watch};
+use crate::gpu::shaders::surface_maps as passes;
+use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::atlas::Atlas;
+use glam::Vec3;
+use std::path::Path;
+
+/// Rays that are cast together.
+const CHUNK_RAYS: usize = 1 << 19;
+
+/// Why there are no maps.
+#[derive(Debug, thiserror::Error)]
+pub enum SurfaceMapError {
+    #[error("{texels} texels; maps can be made of {MAX_PLACES} at most: lower atlas_resolution")]
+    TooManyTexels { texels: usize },
+    #[error(
+        "compressed maps take {bytes} bytes after {done} of {texels} texels, {allowed} are allowed; lower map_resolution or \
+         atlas_resolution"
+    )]
+    OutOfMemory { bytes: u64, done: usize, texels: usize, allowed: u64 },
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// How maps are made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MapOptions {
+    /// Pixels a side of a face.
+    pub resolution: u32,
+    pub sequence: Sequence,
+    /// How far depths keep from the surfaces they tell apart, in widths of a pixel.
+    pub bias: f32,
+}
+
+/// The maps on the device.
+pub struct SurfaceMaps {
+    pub options: MapOptions,
+    pub maps: CompressedMaps,
+    /// Place in the sequence of each texel.
+    pub places: Vec<u32>,
+    /// Where the maps stand, by place, metres.
+    pub origins: Buffer<Vec3>,
+    pub run_offsets: Buffer<u32>,
+    /// depth | first place << 16.
+    pub runs: Buffer<u32>,
+    pub codes_per_metre: f32,
+    /// Rays that were cast; 0 when read from disk.
+    pub ray_count: u64,
+}
+
+/// What maps are made of.
+#[derive(Clone, Copy)]
+pub struct MapInput<'a> {
+    pub atlas: &'a Atlas,
+    pub tracer: Tracer<'a>,
+    /// World-space corners of the scene.
+    pub bounds: [Vec3; 2],
+    /// What the rays may hit, as plain data: goes into the key on disk.
+    pub content: &'a [&'a [u8]],
+    /// Where maps are kept; `None` keeps none.
+    pub cache: Option<&'a Path>,
+}
+
+impl SurfaceMaps {
+    /// Makes the maps, or reads them where they were made before.
+    pub fn new(
+        context: &Context,
+        input: MapInput<'_>,
+        options: MapOptions,
+        watch: &dyn Watch,
+    ) -> Result<Self, SurfaceMapError> {
+        let atlas = input.atlas;
+        if atlas.texels.len() > MAX_PLACES {
+            return Err(SurfaceMapError::TooManyTexels { texels: atlas.texels.len() });
+        }
+        let order = sequence::walk(atlas, options.sequence);
+        let mut places = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
+        let Placement { origins, normals, offset, codes_per_metre } = Placement::new(&input, &order);
+
+        let settings = [options.resolution, options.bias.to_bits(), codes_per_metre.to_bits()];
+        let mut parts: Vec<&[u8]> =
+            vec![bytemuck::cast_slice(&settings), bytemuck::cast_slice(&origins), bytemuck::cast_slice(&normals)];
+        parts.extend(input.content);
+        let key = Key::over(&parts);
+        let mut ray_count = 0;
+        let maps = match input.cache.map(|folder| cache::read(folder, &key)) {
+            Some(Found::Maps(maps)) if maps.place_count as usize == origins.len() => maps,
+            found => {
+                if let (Some(Found::Damaged(reason)), Some(folder)) = (&found, input.cache) {
+                    tracing::warn!("{} is damaged ({reason}); made anew", key.file_in(folder).display());
+                }
+                let maker = Maker { context, tracer: input.tracer, options, codes_per_metre, gap: offset };
+                let maps = maker.make(&origins, &normals, watch)?;
+                ray_count = 2 * maps.pixel_count() as u64 * u64::from(maps.place_count);
+                if let Some(folder) = input.cache
+                    && let Err(error) = cache::write(folder, &key, &maps)
+                {
+                    tracing::warn!("the maps are not kept: {error}");
+                }
+                maps
+            }
+        };
+        let words: Vec<u32> = maps.runs.iter().map(|run| u32::from(run.depth) | u32::from(run.first) << 16).collect();
+        Ok(Self {
+            options,
+            places,
+            origins: context.upload("surface_maps/origins", &origins)?,
+            run_offsets: context.upload("surface_maps/run offsets", &maps.offsets)?,
+            runs: context.upload("surface_maps/runs", &words)?,
+            maps,
+            codes_per_metre,
+            ray_count,
+        })
+    }
+
+    /// How shaders read the maps; `filters` between four pixels.
+    pub fn frame(&self, filters: bool) -> SurfaceMapFrame {
+        SurfaceMapFrame {
+            resolution: self.options.resolution,
+            codes_per_metre: self.codes_per_metre,
+            filters: u32::from(filters),
+        }
+    }
+
+    /// What of each point its texel sees, 0..1; the first `count` queries.
+    pub fn query(
+        &self,
+        recorder: &mut Recorder<'_>,
+        queries: &Buffer<SurfaceMapQuery>,
+        visibility: &Buffer<f32>,
+        count: usize,
+        filters: bool,
+    ) {
+        let pass = passes::Query {
+            queries,
+            map_origins: &self.origins,
+            run_offsets: &self.run_offsets,
+            runs: &self.runs,
+            visibility,
+            params: passes::QueryParams { query_count: count as u32, frame: self.frame(filters) },
+        };
+        recorder.dispatch(&pass, count);
+    }
+}
+
+/// The maps of all places before compression, one after the other: what tests hold the compressed ones against.
+pub fn uncompressed(
+    context: &Context,
+    input: MapInput<'_>,
+    options: MapOptions,
+    order: &[u32],
+    watch: &dyn Watch,
+) -> Result<Vec<Interval>, SurfaceMapError> {
+    let frame = Placement::new(&input, order);
+    let mut all = Vec::new();
+    let maker =
+        Maker { context, tracer: input.tracer, options, codes_per_metre: frame.codes_per_metre, gap: frame.offset };
+    maker.intervals(&frame.origins, &frame.normals, watch, |maps, _| {
+        all.extend_from_slice(maps);
+        Ok(())
+    })?;
+    Ok(all)
+}
+
+/// Where maps stand, by place.
+struct Placement {
+    origins: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    offset: f32,
+    codes_per_metre: f32,
+}
+
+impl Placement {
+    fn new(input: &MapInput<'_>, order: &[u32]) -> Self {
+        let [low, high] = input.bounds;
+        let offset = map_offset(input.bounds);
+        let texels = || order.iter().map(|&texel| input.atlas.texels[texel as usize]);
+        Self {
+            origins: texels().map(|texel| texel.position + offset * texel.normal).collect(),
+            normals: texels().map(|texel| texel.normal).collect(),
+            offset,
+            codes_per_metre: 65_533.0 / (high - low).length().max(f32::MIN_POSITIVE),
+        }
+    }
+}
+
+/// How far maps stand off their surface, metres.
+pub fn map_offset([low, high]: [Vec3; 2]) -> f32 {
+    let reach = low.abs().max(high.abs()).max_element().max((high - low).length());
+    1e-5 * reach
+}
+
+/// Casts and compresses.
+struct Maker<'a> {
+    context: &'a Context,
+    tracer: Tracer<'a>,
+    options: MapOptions,
+    codes_per_metre: f32,
+    /// How far behind a surface the next is sought, metres.
+    gap: f32,
+}
+
+/// Buffers of a chunk.
+struct Chunk {
+    rays: Buffer<Ray>,
+    hits: Buffer<Hit>,
+    second_hits: Buffer<Hit>,
+    intervals: Buffer<u32>,
+}
+
+impl Maker<'_> {
+    fn make(&self, origins: &[Vec3], normals: &[Vec3], watch: &dyn Watch) -> Result<CompressedMaps, SurfaceMapError> {
+        let allowed = self.context.limits().storage_buffer_bytes;
+        let mut compressor = Compressor::new(6 * (self.options.resolution as usize).pow(2));
+        let mut done = 0;
+        self.intervals(origins, normals, watch, |maps, count| {
+            compressor.push(maps);
+            done += count;
+            let bytes = compressor.size_bytes();
+            if bytes > allowed {
+                return Err(SurfaceMapError::OutOfMemory { bytes, done, texels: origins.len(), allowed });
+            }
+            Ok(())
+        })?;
+        Ok(compressor.finish())
+    }
+
+    /// Hands on the maps of all places, chunk by chunk, with how many they are.
+    fn intervals(
+        &self,
+        origins: &[Vec3],
+        normals: &[Vec3],
+        watch: &dyn Watch,
+        mut hand_on: impl FnMut(&[Interval], usize) -> Result<(), SurfaceMapError>,
+    ) -> Result<(), SurfaceMapError> {
+        let context = self.context;
+        let pixel_count = 6 * (self.options.resolution as usize).pow(2);
+        let chunk_places = (CHUNK_RAYS / pixel_count).clamp(1, origins.len().max(1));
+        let map_origins = context.upload("surface_maps/origins", origins)?;
+        let map_normals = context.upload("surface_maps/normals", normals)?;
+        let ray_count = chunk_places * pixel_count;
+        let chunk = Chunk {
+            rays: context.buffer("surface_maps/rays", ray_count)?,
+            hits: context.buffer("surface_maps/hits", ray_count)?,
+            second_hits: context.buffer("surface_maps/second hits", ray_count)?,
+            intervals: context.buffer("surface_maps/intervals", ray_count)?,
+        };
+        for first in (0..origins.len()).step_by(chunk_places) {
+            watch.step("surface shadow maps", first as u64, origins.len() as u64)?;
+            let count = chunk_places.min(origins.len() - first);
+            let mut recorder = context.recorder("surface maps")?;
+            self.cast(&mut recorder, &chunk, &map_origins, &map_normals, first as u32, count as u32);
+            recorder.submit()?;
+            let words = context.download_range(&chunk.intervals, 0..count * pixel_count)?;
+            hand_on(bytemuck::cast_slice(&words), count)?;
+        }
+        watch.step("surface shadow maps", origins.len() as u64, origins.len() as u64)?;
+        Ok(())
+    }
+
+    /// First and second surfaces of a chunk's pixels, as intervals of depths.
+    fn cast(
+        &self,
+        recorder: &mut Recorder<'_>,
+        chunk: &Chunk,
+        map_origins: &Buffer<Vec3>,
+        map_normals: &Buffer<Vec3>,
+        first_place: u32,
+        chunk_count: u32,
+    ) {
+        let resolution = self.options.resolution;
+        let ray_count = 6 * resolution * resolution * chunk_count;
+        let rays = &chunk.rays;
+        let params = passes::CubeRaysParams { first_place, chunk_count, resolution };
+        recorder.dispatch(&passes::CubeRays { map_origins, map_normals, rays, params }, ray_count);
+        trace::closest_hit(recorder, &self.tracer, rays, &chunk.hits, ray_count as usize);
+        let params = passes::SecondRaysParams { ray_count, gap: self.gap };
+        recorder.dispatch(&passes::SecondRays { hits: &chunk.hits, rays, params }, ray_count);
+        trace::closest_hit(recorder, &self.tracer, rays, &chunk.second_hits, ray_count as usize);
+        let pass = passes::Intervals {
+            map_normals,
+            hits: &chunk.hits,
+            second_hits: &chunk.second_hits,
+            intervals: &chunk.intervals,
+            params: passes::IntervalsParams {
+                first_place,
+                chunk_count,
+                resolution,
+                codes_per_metre: self.codes_per_metre,
+                bias: self.options.bias,
+            },
+        };
+        recorder.dispatch(&pass, ray_count);
+    }
+}

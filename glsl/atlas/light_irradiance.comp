@@ -1,0 +1,37 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/atlas.glsl"
+#include "lib/light.glsl"
+#include "lib/ray.glsl"
+
+// One thread per texel of a batch: irradiance from one punctual light, mean over its points.
+// reads texels, lights, rays, is_free [batch_count * sample_count]   updates irradiance[texel_count] (W/m2)   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Texels { AtlasTexel texels[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Lights { Light lights[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Rays { Ray rays[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer IsFree { uint is_free[]; };
+layout(set = 0, binding = 4, scalar) buffer Irradiance { vec3 irradiance[]; };
+layout(push_constant, scalar) uniform Params {
+    uint first_texel;
+    uint batch_count;
+    uint sample_count;
+    uint light;
+} params;
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= params.batch_count) return;
+
+    uint index = params.first_texel + i;
+    vec3 normal = texels[index].normal, sum = vec3(0.0);
+    for (uint ray = i * params.sample_count; ray < (i + 1) * params.sample_count; ++ray) {
+        if (rays[ray].t_max < 0.0 || is_free[ray] == 0) continue;
+        vec3 to_light;
+        float distance_to_light;
+        vec3 arriving = light_irradiance(lights[params.light], rays[ray].origin, to_light, distance_to_light);
+        sum += arriving * max(dot(normal, to_light), 0.0);
+    }
+    irradiance[index] += sum / float(params.sample_count);
+}

@@ -1,0 +1,27 @@
+#ifndef LIB_ATLAS
+#define LIB_ATLAS
+// Texels of the atlas as receivers.
+struct AtlasTexel {
+    vec3 position;      // centroid, metres
+    vec3 normal;        // unit
+    vec3 side_u;        // of the parallelogram that stands for it, metres
+    vec3 side_v;
+    uint first_part;
+    uint part_count;
+    uint is_back;
+};
+
+// The part of one triangle in a texel.
+struct AtlasPart {
+    uint triangle;
+    vec2 barycentrics;  // of its centroid: corners 1 and 2
+    float area;         // m2
+};
+
+// The k-th of an even sequence of points on the texel.                                                 [Roberts2018]
+vec3 texel_point(AtlasTexel texel, uint k)
+{
+    vec2 u = fract(vec2(0.5) + float(k) * vec2(0.75487766, 0.56984029)) - 0.5;
+    return texel.position + u.x * texel.side_u + u.y * texel.side_v;
+}
+#endif

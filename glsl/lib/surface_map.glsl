@@ -1,0 +1,61 @@
+#ifndef LIB_SURFACE_MAP
+#define LIB_SURFACE_MAP
+// Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
+//
+// Bridges: the kernel binds the runs of all pixels.
+//     uint surface_run_offset(uint pixel)        where the pixel's runs start; its successor's ends them
+//     uint surface_run(uint index)               depth | first place << 16
+#include "lib/cube_map.glsl"
+
+uint surface_run_offset(uint pixel);
+uint surface_run(uint index);
+
+struct SurfaceMapFrame {
+    uint resolution;        // pixels a side of a face
+    float codes_per_metre;
+    uint filters;           // 1: between four pixels
+};
+
+// The depth at a place of the sequence: of the last run that starts at it or before.
+uint surface_map_depth(uint place, uint pixel)
+{
+    uint low = surface_run_offset(pixel), high = surface_run_offset(pixel + 1);
+    // low's run starts at or before the place, high's after it.
+    while (high - low > 1) {
+        uint middle = low + high >> 1;
+        if (surface_run(middle) >> 16 <= place) low = middle;
+        else high = middle;
+    }
+    return surface_run(low) & 0xffffu;
+}
+
+float surface_pixel_seen(uint place, uint pixel, float code)
+{
+    return code <= float(surface_map_depth(place, pixel)) ? 1.0 : 0.0;
+}
+
+// Share of the point that is seen from the texel at `place`, whose map stands at `from`; 0 or 1 unfiltered.
+float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 point)
+{
+    vec3 d = point - from;
+    float code = min(sqrt(dot(d, d)) * frame.codes_per_metre, 65533.0);
+    uint face = cube_face(d);
+    uint resolution = frame.resolution;
+    vec2 at = cube_place(d, face, resolution);
+    if (frame.filters == 0) {
+        uvec2 pixel = min(uvec2(max(at, vec2(0.0))), uvec2(resolution - 1));
+        return surface_pixel_seen(place, cube_pixel_index(face, pixel, resolution), code);
+    }
+    // Percentage-closer filtering over the four pixels around; at a face's edge the outer ones count for the inner.
+    at = clamp(at - 0.5, vec2(0.0), vec2(float(resolution) - 1.0));
+    uvec2 low = min(uvec2(at), uvec2(resolution - 2));
+    vec2 t = at - vec2(low);
+    float sum = 0.0;
+    for (uint k = 0; k < 4; ++k) {
+        uvec2 step = uvec2(k & 1, k >> 1);
+        float weight = (step.x == 0 ? 1.0 - t.x : t.x) * (step.y == 0 ? 1.0 - t.y : t.y);
+        if (weight > 0.0) sum += weight * surface_pixel_seen(place, cube_pixel_index(face, low + step, resolution), code);
+    }
+    return sum;
+}
+#endif

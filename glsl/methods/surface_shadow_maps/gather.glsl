@@ -1,0 +1,73 @@
+#ifndef METHODS_SURFACE_SHADOW_MAPS_GATHER
+#define METHODS_SURFACE_SHADOW_MAPS_GATHER
+// Refine and gather for one texel of the atlas in one walk over the sender tree.            [Ritschel2008 4.3, Fig. 10]
+// The kernel that includes this says how it sees, as in display/final_gather.glsl; bindings 0 to 6 and set 1 are its own.
+#include "lib/atlas.glsl"
+#include "lib/sender_gather.glsl"
+
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 7, scalar) readonly buffer Texels { AtlasTexel texels[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 9) uniform usamplerBuffer sender_nodes;       // SENDER_NODE_TEXELS each
+layout(set = 0, binding = 10) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
+layout(set = 0, binding = 11, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Adaptation { float adaptation[]; };
+layout(set = 0, binding = 14, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 15, scalar) writeonly buffer CutSizes { uint cut_sizes[]; };
+layout(push_constant, scalar) uniform Params {
+    uint texel_count;
+    uint node_count;
+    uint seed;
+    uint jitter;
+    float ray_offset;           // m
+    float threshold;            // of what the display shows, 0..1
+    float exposure;
+    float key;
+    float white;
+    uint operator;
+} params;
+
+uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
+uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
+SenderLeaf sender_shape(uint slot) { return leaves[slot]; }
+LeafLight sender_leaf_light(uint slot) { return leaf_light[slot]; }
+
+void gather_texel()
+{
+    uint index = linear_index();
+    if (index >= params.texel_count) return;
+
+    AtlasTexel texel = texels[index];
+    // White, so that what is reflected is the irradiance over pi: dark texels are lit as carefully as bright ones.
+    Surface surface = Surface(vec3(1.0), vec3(0.0), 0.0, 1.0, vec3(0.0), texel.normal, true);
+    receiver = Receiver(texel.position, texel.normal, texel.normal, surface);
+    slack = params.ray_offset;
+    float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
+    vec3 reflects = albedo[index];
+    scale *= max(reflects.r, max(reflects.g, reflects.b));
+    options = GatherOptions(params.threshold, scale, params.white, params.operator, 0.0, params.jitter != 0, 0u);
+    start_showing(0.0);
+
+    vec3 origin = texel.position + params.ray_offset * texel.normal;
+    vec3 sum = vec3(0.0);
+    uint node = 0, visited = 0, cut = 0;
+    while (true) {
+        Arrival arrival;
+        bool found = false;
+        while (!found && node < params.node_count) {
+            uint taken = next_sender(node, params.node_count, visited);
+            if (taken == NO_SENDER) break;
+            ++cut;
+            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 2u, params.seed)));
+            found = arrival.direct + arrival.indirect != vec3(0.0);
+        }
+        if (!found) break;
+        vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);
+        sum += light;
+        start_showing(shown_luminance + luminance(light));
+    }
+    irradiance[index] = PI * sum;
+    cut_sizes[index] = cut;
+}
+#endif

@@ -1,0 +1,24 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/surface_map.glsl"
+
+// One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
+// reads texels, albedo, the sender tree, the maps   writes irradiance (W/m2), cut_sizes [texel_count]   shared none
+layout(set = 0, binding = 0, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };       // by place
+layout(set = 0, binding = 3, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
+
+uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
+uint surface_run(uint index) { return runs[index]; }
+
+float visibility(vec3 origin, vec3 target, uint leaf)
+{
+    uint place = leaf_places[leaf];
+    return surface_map_visibility(map_frame[0], place, map_origins[place], origin);
+}
+
+#include "methods/surface_shadow_maps/gather.glsl"
+
+void main() { gather_texel(); }

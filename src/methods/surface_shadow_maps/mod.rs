@@ -1,0 +1,419 @@
+//! Coherent surface shadow maps [Ritschel2008]: visibility as a look-up, hierarchical radiosity over the texels of an
+//! atlas, and a final gather per pixel from the same tree.
+//!
+//! Every texel holds a compressed depth cube map. In each bounce every texel finds its own cut through a tree over all
+//! texels and gathers from its nodes in one walk without a stack, asking the senders' maps whether they see it; then the
+//! tree's inner nodes are summed up anew. The picture is one more such walk, per pixel.
+//!
+//! | paper | here | unit | buffer |
+//! |---|---|---|---|
+//! | D, depth cube maps | [`SurfaceMaps`] | codes | `surface_maps/runs` |
+//! | atlas | [`Atlas`], [`Texels`] | – | `texels/texels` |
+//! | N_s, N_r | node of the tree, texel | – | [`SenderTree`] |
+//! | L_max | `largest_radiance` of `lib/receiver.glsl` | W m^-2 sr^-1 | – |
+//! | L of a texel | irradiance, `reflected` | W/m2 | `surface_shadow_maps/irradiance` ... |
+//! | threshold | [`Settings::threshold`] | of white | – |
+//!
+//! **Per frame without new maps:** lights, emission, albedo, environment. **With new maps:** surfaces that move.
+//!
+//! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
+//! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
+//! direct light of emissive texels comes by the same walk.
+//!
+//! [Ritschel2008]: crate::methods::PAPERS
+
+use crate::gpu::shaders::methods::surface_shadow_maps as passes;
+use crate::gpu::shaders::types::SurfaceMapFrame;
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::report::tonemap::ToneSettings;
+use crate::scene::Scene;
+use crate::scene::atlas::{self, Atlas, AtlasError};
+use crate::scene::geometry::Geometry;
+use crate::stages::sender_tree::{SenderTree, SenderTreeError, TreeOptions};
+use crate::stages::surface_maps::{MapInput, MapOptions, Sequence, SurfaceMapError, SurfaceMaps, map_offset};
+use crate::stages::texels::{self, Texels};
+use crate::stages::trace::{self, Tracer};
+use crate::stages::work::Watch;
+use crate::stages::world::World;
+use glam::Vec3;
+use std::path::Path;
+
+crate::choice! {
+    /// What decides whether texels see each other.
+    pub enum TexelVisibility {
+        /// The surface shadow maps of the senders
+        Maps = "maps",
+        /// Rays by our own traversal; no maps are made
+        Rays = "rays",
+    }
+}
+
+crate::settings! {
+    /// What surface shadow maps let the user choose.
+    pub struct Settings {
+        /// Texels a side of the atlas; 0 takes as many as the scene's charts ask for, from 64 to 256.
+        atlas_resolution: u32 = 0, range 0..=2048, unit "texels", paper "32 to 128";
+        /// Pixels a side of a depth cube map's face.
+        map_resolution: u32 = 32, range 4..=256, unit "pixels", paper "32 or 64";
+        /// How the texels are walked when maps are compressed.
+        sequence: Sequence = Sequence::Spiral, paper "spiral is best";
+        /// How far depths keep from the surfaces they tell apart.
+        map_bias: f32 = 1.0, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
+        /// Filter look-ups between four pixels of a map.
+        map_filter: bool = true, paper "not given";
+        /// What decides whether texels see each other.
+        visibility: TexelVisibility = TexelVisibility::Maps, paper "maps";
+        /// A node is opened where its light, gone wrong, would change what is shown by more than this.
+        threshold: f32 = 0.02, range 0.0..=1.0, unit "of white", paper "user-defined";
+        /// Draw leaves of a node, and points on them, by chance.
+        jitter: bool = true, paper "not in bounces";
+        /// Points of each texel that shadow rays to punctual lights start from.
+        light_samples: u32 = 8, range 1..=1024, unit "points", paper "shadow maps";
+        /// Rays of each texel to the environment.
+        environment_rays: u32 = 128, range 1..=65536, unit "rays", paper "not given";
+        /// How much a difference of normals counts beside distance when the tree is cut.
+        tree_normal_weight: f32 = 0.25, range 0.0..=10.0, paper "0: by position alone";
+        /// Keep the maps on disk, in the user's cache folder.
+        keep_maps: bool = true, paper "not given";
+    }
+}
+
+/// Why the method cannot be prepared.
+#[derive(Debug, thiserror::Error)]
+pub enum SurfaceShadowMapsError {
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
+    #[error(transparent)]
+    Tree(#[from] SenderTreeError),
+    #[error(transparent)]
+    Maps(#[from] SurfaceMapError),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// What the method reads of the scene.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    pub scene: &'a Scene,
+    pub geometry: &'a Geometry,
+    /// World space in the present pose.
+    pub positions: &'a [Vec3],
+    pub bounds: [Vec3; 2],
+    pub world: &'a World,
+    pub tracer: Tracer<'a>,
+    /// What the picture will be shown with: it says where errors show.
+    pub tone: ToneSettings,
+    pub seed: u32,
+    /// Where maps are kept between runs.
+    pub cache: Option<&'a Path>,
+    pub watch: &'a dyn Watch,
+}
+
+/// The method on one scene.
+pub struct SurfaceShadowMaps {
+    settings: Settings,
+    pub atlas: Atlas,
+    pub texels: Texels,
+    pub tree: SenderTree,
+    pub maps: Option<PlacedMaps>,
+    tone: ToneSettings,
+    seed: u32,
+    state: State,
+}
+
+/// The maps, and whose they are.
+pub struct PlacedMaps {
+    pub maps: SurfaceMaps,
+    /// Place in the sequence of each leaf of the tree, in tree order.
+    pub leaf_places: Buffer<u32>,
+    /// One: how the maps are read.
+    pub frame: Buffer<SurfaceMapFrame>,
+}
+
+/// Light of the texels, W/m2, `texel_count` entries each.
+struct State {
+    emitted: Buffer<Vec3>,
+    /// Nothing: what reflects, or emits, when only the other counts.
+    dark: Buffer<Vec3>,
+    /// Of the last bounce.
+    irradiance: Buffer<Vec3>,
+    reflected: Buffer<Vec3>,
+    reflected_sum: Buffer<Vec3>,
+    irradiance_sum: Buffer<Vec3>,
+    cut_sizes: Buffer<u32>,
+}
+
+/// What was made, in numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Report {
+    pub texels: u32,
+    pub charts: u32,
+    pub atlas_resolution: u32,
+    pub nodes: u32,
+    pub tree_bytes: u64,
+    pub map_bytes: u64,
+    /// Bytes of the maps uncompressed for each byte of runs; 0 without maps.
+    pub ratio: f64,
+    /// Cast for the maps; 0 where they were read from disk.
+    pub map_rays: u64,
+}
+
+impl std::fmt::Display for Report {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { texels, charts, atlas_resolution, nodes, .. } = self;
+        write!(f, "{texels} texels in {charts} charts ({atlas_resolution} x {atlas_resolution}), {nodes} nodes")?;
+        if self.map_bytes > 0 {
+            let source = if self.map_rays > 0 { format!("{} rays", self.map_rays) } else { "read from disk".into() };
+            write!(f, "; maps of {} bytes, compressed {:.1} : 1, {source}", self.map_bytes, self.ratio)?;
+        }
+        Ok(())
+    }
+}
+
+impl SurfaceShadowMaps {
+    /// Unwraps the scene, builds the tree and makes the maps.
+    pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, SurfaceShadowMapsError> {
+        let atlas = make_atlas(stage, settings.atlas_resolution)?;
+        let texels = Texels::new(context, &atlas, stage.world, map_offset(stage.bounds))?;
+        let options = TreeOptions { normal_weight: settings.tree_normal_weight, ..TreeOptions::default() };
+        let tree = SenderTree::build(context, &texels::leaves(&atlas), options)?;
+        let maps = match settings.visibility {
+            TexelVisibility::Maps => Some(PlacedMaps::new(context, stage, &atlas, &tree, &settings)?),
+            TexelVisibility::Rays => None,
+        };
+        let state = State::new(context, texels.count as usize)?;
+        Ok(Self { settings, atlas, texels, tree, maps, tone: stage.tone, seed: stage.seed, state })
+    }
+
+    /// Direct light of the texels and `bounces` more; leaves the tree filled with all of it, ready to be gathered from.
+    ///                                                                                       [Ritschel2008 4.1, Fig. 8]
+    pub fn solve(&self, recorder: &mut Recorder<'_>, world: &World, tracer: &Tracer<'_>, bounces: u32) {
+        let (texels, s) = (&self.texels, &self.state);
+        for sum in [&s.reflected_sum, &s.irradiance_sum, &s.dark] {
+            recorder.fill(sum, 0);
+        }
+        let pass = passes::Emit {
+            emission: &texels.emission,
+            emitted: &s.emitted,
+            params: passes::EmitParams { texel_count: texels.count },
+        };
+        recorder.dispatch(&pass, texels.count);
+        recorder.scope("direct", |recorder| {
+            self.tree.pull(recorder, &s.emitted, &s.dark);
+            self.gather(recorder, tracer, 0);
+            texels.add_lights(recorder, tracer, world, self.settings.light_samples, &s.irradiance);
+            texels.add_environment(recorder, tracer, world, self.settings.environment_rays, &s.irradiance);
+            self.reflect(recorder);
+        });
+        for bounce in 1..=bounces {
+            recorder.scope(format_args!("bounce {bounce}"), |recorder| {
+                self.tree.pull(recorder, &s.dark, &s.reflected);
+                self.gather(recorder, tracer, bounce);
+                self.reflect(recorder);
+            });
+        }
+        self.tree.pull(recorder, &s.emitted, &s.reflected_sum);
+    }
+
+    /// Fills the tree with what emits alone: what is shown without bounces.
+    pub fn emit_only(&self, recorder: &mut Recorder<'_>) {
+        self.tree.pull(recorder, &self.state.emitted, &self.state.dark);
+    }
+
+    /// Refine and gather for all texels in one walk each.                          [Ritschel2008 4.3, Fig. 10]
+    fn gather(&self, recorder: &mut Recorder<'_>, tracer: &Tracer<'_>, bounce: u32) {
+        use crate::report::tonemap::Operator;
+        let (texels, tree, s) = (&self.texels, &self.tree, &self.state);
+        let (operator, key) = match self.tone.operator {
+            Operator::Reinhard => (0, self.tone.key),
+            Operator::Filmic => (1, self.tone.key),
+            Operator::None => (2, 0.0),
+        };
+        macro_rules! gather {
+            ($pass:ident, $params:ident, { $($field:ident: $value:expr),* $(,)? }) => {{
+                let pass = passes::$pass {
+                    $($field: $value,)*
+                    texels: &texels.texels,
+                    albedo: &texels.albedo,
+                    sender_nodes: &tree.nodes,
+                    sender_light: &tree.light,
+                    leaves: &tree.leaves,
+                    leaf_light: &tree.leaf_light,
+                    adaptation: &tree.adaptation,
+                    irradiance: &s.irradiance,
+                    cut_sizes: &s.cut_sizes,
+                    params: passes::$params {
+                        texel_count: texels.count,
+                        node_count: tree.node_count(),
+                        seed: self.seed.wrapping_add(bounce.wrapping_mul(0x9e37_79b9)),
+                        jitter: u32::from(self.settings.jitter),
+                        ray_offset: texels.ray_offset,
+                        threshold: self.settings.threshold,
+                        exposure: self.tone.exposure.exp2(),
+                        key,
+                        white: self.tone.white,
+                        operator,
+                    },
+                };
+                recorder.dispatch(&pass, texels.count);
+            }};
+        }
+        match (&self.maps, tracer) {
+            (Some(PlacedMaps { maps, leaf_places, frame }), _) => gather!(GatherMaps, GatherMapsParams, {
+                run_offsets: &maps.run_offsets,
+                runs: &maps.runs,
+                map_origins: &maps.origins,
+                leaf_places: leaf_places,
+                map_frame: frame,
+            }),
+            (None, Tracer::Compute(bvh, surfaces)) => gather!(GatherRays, GatherRaysParams, {
+                constants: passes::GatherRaysConstants { alpha_test: surfaces.has_holes },
+                bvh_nodes: bvh.nodes(),
+                bvh_triangles: bvh.triangles(),
+                triangles: surfaces.triangles,
+                triangle_materials: surfaces.triangle_materials,
+                attributes: surfaces.attributes,
+                materials: surfaces.materials,
+                textures: surfaces.textures,
+            }),
+            (None, Tracer::RayQuery(structure, surfaces)) => gather!(GatherRayQuery, GatherRayQueryParams, {
+                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes },
+                acceleration_structure: structure,
+                triangles: surfaces.triangles,
+                triangle_materials: surfaces.triangle_materials,
+                attributes: surfaces.attributes,
+                materials: surfaces.materials,
+                textures: surfaces.textures,
+            }),
+        }
+    }
+
+    /// What arrived leaves again, and is kept.
+    fn reflect(&self, recorder: &mut Recorder<'_>) {
+        let s = &self.state;
+        let pass = passes::Reflect {
+            irradiance: &s.irradiance,
+            albedo: &self.texels.albedo,
+            reflected: &s.reflected,
+            reflected_sum: &s.reflected_sum,
+            irradiance_sum: &s.irradiance_sum,
+            params: passes::ReflectParams { texel_count: self.texels.count },
+        };
+        recorder.dispatch(&pass, self.texels.count);
+    }
+
+    /// Of the last bounce alone, W/m2 per texel.
+    pub fn last_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.irradiance
+    }
+
+    /// Of direct light and all bounces, W/m2 per texel.
+    pub fn irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.irradiance_sum
+    }
+
+    /// Nodes that each texel gathered from in the last bounce.
+    pub fn cut_sizes(&self) -> &Buffer<u32> {
+        &self.state.cut_sizes
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub fn report(&self) -> Report {
+        let maps = self.maps.as_ref().map(|placed| &placed.maps);
+        Report {
+            texels: self.texels.count,
+            charts: self.atlas.chart_count,
+            atlas_resolution: self.atlas.resolution,
+            nodes: self.tree.node_count(),
+            tree_bytes: self.tree.size_bytes(),
+            map_bytes: maps.map_or(0, |maps| maps.maps.size_bytes()),
+            ratio: maps.map_or(0.0, |maps| maps.maps.ratio()),
+            map_rays: maps.map_or(0, |maps| maps.ray_count),
+        }
+    }
+}
+
+/// Texels that a chart has in the mean, at least, where the resolution is not given.
+const TEXELS_PER_CHART: usize = 8;
+
+fn make_atlas(stage: &Stage<'_>, resolution: u32) -> Result<Atlas, AtlasError> {
+    let make = |resolution| Atlas::new(stage.scene, stage.geometry, stage.positions, resolution);
+    if resolution > 0 {
+        return make(resolution);
+    }
+    let mut resolution = 64;
+    loop {
+        match make(resolution) {
+            Ok(atlas) if resolution >= 256 || atlas.texels.len() >= TEXELS_PER_CHART * atlas.chart_count as usize => {
+                return Ok(atlas);
+            }
+            Err(error) if resolution >= atlas::MAX_RESOLUTION => return Err(error),
+            _ => resolution *= 2,
+        }
+    }
+}
+
+impl PlacedMaps {
+    fn new(
+        context: &Context,
+        stage: &Stage<'_>,
+        atlas: &Atlas,
+        tree: &SenderTree,
+        settings: &Settings,
+    ) -> Result<Self, SurfaceShadowMapsError> {
+        let options = MapOptions {
+            resolution: settings.map_resolution,
+            sequence: settings.sequence,
+            bias: settings.map_bias,
+        };
+        let holes: Vec<u8> = hole_content(stage.scene);
+        let content =
+            [bytemuck::cast_slice(stage.positions), bytemuck::cast_slice(&stage.geometry.triangles), &holes];
+        let input = MapInput {
+            atlas,
+            tracer: stage.tracer,
+            bounds: stage.bounds,
+            content: &content,
+            cache: stage.cache.filter(|_| settings.keep_maps),
+        };
+        let maps = SurfaceMaps::new(context, input, options, stage.watch)?;
+        let order = &tree.topology.leaf_order;
+        let leaf_places: Vec<u32> = order.iter().map(|&texel| maps.places[texel as usize]).collect();
+        let frame = maps.frame(settings.map_filter);
+        Ok(Self {
+            leaf_places: context.upload("surface_shadow_maps/leaf places", &leaf_places)?,
+            frame: context.upload("surface_shadow_maps/frame", &[frame])?,
+            maps,
+        })
+    }
+}
+
+/// What decides which rays pass through holes: cutoffs and textures of masked materials.
+fn hole_content(scene: &Scene) -> Vec<u8> {
+    let mut content = Vec::new();
+    for material in &scene.materials {
+        content.extend(material.alpha_cutoff.unwrap_or(-1.0).to_le_bytes());
+        if material.alpha_cutoff.is_some() {
+            content.extend(format!("{material:?}").bytes());
+        }
+    }
+    content
+}
+
+impl State {
+    fn new(context: &Context, count: usize) -> Result<Self, GpuError> {
+        let light = |name: &str| context.buffer(&format!("surface_shadow_maps/{name}"), count);
+        Ok(Self {
+            emitted: light("emitted")?,
+            dark: light("dark")?,
+            irradiance: light("irradiance")?,
+            reflected: light("reflected")?,
+            reflected_sum: light("reflected sum")?,
+            irradiance_sum: light("irradiance sum")?,
+            cut_sizes: context.buffer("surface_shadow_maps/cut sizes", count)?,
+        })
+    }
+}
