@@ -18,6 +18,13 @@ struct AtlasPart {
     float area;         // m2
 };
 
+// Where a triangle's corners lie in the atlas, texels.
+struct TriangleCorners {
+    vec2 a;
+    vec2 b;
+    vec2 c;
+};
+
 // The k-th of an even sequence of points on the texel.                                                 [Roberts2018]
 vec3 texel_point(AtlasTexel texel, uint k)
 {

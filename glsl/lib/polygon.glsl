@@ -17,7 +17,7 @@ float edge_term(vec3 a, vec3 b, vec3 n)
 }
 
 // The polygon of `count` (3 or 4) corners relative to the point, clipped at the point's horizon; `n` is the point's unit
-// normal. Counter-clockwise seen from the point or not: the sign is dropped.                [Lambert1760; Baum1989]
+// normal. Counter-clockwise seen from the point or not: the sign is dropped.                             [Baum1989]
 SeenPolygon seen_polygon(vec3 corners[4], uint count, vec3 n)
 {
     vec3 kept[5];

@@ -82,7 +82,7 @@ pub struct RenderArgs {
     /// Method, see `linklight methods`
     #[arg(long, value_name = "KEY", value_parser = parse_method, default_value = "explicit-visibility")]
     pub method: &'static Method,
-    /// How the solution becomes pixels [default: vertex; path-tracing has none]
+    /// How the solution becomes pixels [default: vertex; final-gather for surface-shadow-maps; path-tracing has none]
     #[arg(long, value_enum)]
     pub display: Option<Display>,
     /// Indirect bounces after the direct light
@@ -137,6 +137,9 @@ pub struct RenderArgs {
     /// Extra channels of an .exr, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     pub channels: Vec<Channel>,
+    /// Write the irradiance of the atlas' texels, W/m2, without punctual direct light (surface-shadow-maps)
+    #[arg(long, value_name = "FILE.exr")]
+    pub lightmap: Option<PathBuf>,
     /// Write times, bytes and counters of every pass as JSON
     #[arg(long, value_name = "FILE.json")]
     pub profile: Option<PathBuf>,
@@ -157,6 +160,8 @@ pub enum Display {
     Vertex,
     /// Gather from the solution at every pixel, with visibility
     FinalGather,
+    /// Filter the texels of the method's atlas (surface-shadow-maps)
+    Lightmap,
 }
 
 /// Ways to cast rays.

@@ -3,6 +3,7 @@
 use super::AppError;
 use super::cli::{Channel, Display};
 use super::on_elements::OnElements;
+use super::on_texels::TexelsShown;
 use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
 use crate::display::direct::Sample;
@@ -26,6 +27,7 @@ pub enum Method {
     PathTracing(Box<PathTracing>),
     OnElements(Box<VertexShown>),
     Antiradiance(Box<AntiradianceShown>),
+    OnTexels(Box<TexelsShown>),
 }
 
 /// Antiradiance with the display stage that shows it.
@@ -102,6 +104,9 @@ impl Method {
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
                 let g_buffer = GBuffer::new(context, request.width, request.height)?;
                 Ok(Self::Antiradiance(Box::new(AntiradianceShown { method, shadow_maps, g_buffer })))
+            }
+            "surface-shadow-maps" => {
+                Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
@@ -182,6 +187,7 @@ impl Method {
                 recorder.submit()?;
                 Ok(())
             }
+            Self::OnTexels(shown) => shown.frame(context, request, stage, film, watch),
             Self::Antiradiance(shown) => {
                 let AntiradianceShown { method, shadow_maps, g_buffer } = &mut **shown;
                 method.solve(context, world, request.bounces, watch).map_err(AppError::failed)?;
@@ -220,7 +226,6 @@ impl Gather {
         Ok(Self { leaves, display })
     }
 
-    /// Gathers a solution sample by sample: each is a submission, so that the user can interrupt between them.
     fn frame(
         &self,
         context: &Context,
@@ -247,22 +252,37 @@ impl Gather {
             world,
             tree: &self.leaves.tree,
             tracer: stage.tracer(),
+            maps: None,
+            bvh: &stage.bvh,
             shadow_maps,
             g_buffer,
             view: &stage.view,
         };
-        for index in 0..request.spp {
-            watch.step("final gather", index.into(), request.spp.into())?;
-            let mut recorder = context.recorder("frame")?;
-            recorder.scope("display", |recorder| {
-                self.display.draw(recorder, gathered, Sample { index, samples: request.spp, is_unlit: false }, film);
-            });
-            recorder.submit()?;
-        }
-        watch.step("final gather", request.spp.into(), request.spp.into())?;
-        tracing::info!("{}", self.display.report(context)?);
-        Ok(())
+        gather_samples(context, request, &self.display, gathered, film, watch)
     }
+}
+
+/// Gathers a solution sample by sample: each is a submission, so that the user can interrupt between them.
+pub(super) fn gather_samples(
+    context: &Context,
+    request: &RenderRequest,
+    display: &FinalGather,
+    gathered: Gathered<'_>,
+    film: &Film,
+    watch: &dyn Watch,
+) -> Result<(), AppError> {
+    for index in 0..request.spp {
+        watch.step("final gather", index.into(), request.spp.into())?;
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("display", |recorder| {
+            display.draw(recorder, gathered, Sample { index, samples: request.spp, is_unlit: false }, film);
+        });
+        recorder.submit()?;
+    }
+    watch.step("final gather", request.spp.into(), request.spp.into())?;
+    let report = display.report(context)?;
+    tracing::info!("{report}");
+    Ok(())
 }
 
 /// Reads the film back: the light asked for as RGB, and the extra channels.

@@ -21,6 +21,7 @@ pub mod interrupt;
 pub mod measure;
 pub mod methods;
 mod on_elements;
+mod on_texels;
 pub mod output;
 pub mod render;
 mod stage;

@@ -63,6 +63,8 @@ pub struct RenderRequest {
     pub display_assignments: Vec<Assignment>,
     /// Each at most once, in order of declaration.
     pub channels: Vec<Channel>,
+    /// Where the irradiance of the atlas goes.
+    pub lightmap: Option<PathBuf>,
     pub profile: Option<PathBuf>,
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
@@ -103,13 +105,29 @@ impl TryFrom<RenderArgs> for RenderRequest {
         if args.indirect_only && args.bounces == 0 {
             return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
         }
-        let display = (!path_traced).then(|| args.display.unwrap_or_default());
+        let on_texels = args.method.key == "surface-shadow-maps";
+        let default = if on_texels { Display::FinalGather } else { Display::Vertex };
+        let display = (!path_traced).then(|| args.display.unwrap_or(default));
+        if let Some(shown) = display
+            && ((on_texels && shown == Display::Vertex) || (!on_texels && shown == Display::Lightmap))
+        {
+            let key = args.method.key;
+            let (what, others) = if on_texels {
+                ("texels, not vertices", "final-gather or lightmap")
+            } else {
+                ("vertices, not an atlas", "vertex or final-gather")
+            };
+            return usage(format!("{key} solves on {what}; show it by --display {others}"));
+        }
+        if args.lightmap.is_some() && !on_texels {
+            return usage(format!("--lightmap needs --method surface-shadow-maps; {} has no atlas", args.method.key));
+        }
         let (of_display, of_method) = split_assignments(display, args.set);
         args.method.record(&of_method)?;
         final_gather::Settings::from_assignments(&of_display)?;
 
         let mut written = vec![&args.output.path];
-        written.extend([&args.profile, &args.trace, &args.capture].into_iter().flatten());
+        written.extend([&args.lightmap, &args.profile, &args.trace, &args.capture].into_iter().flatten());
         for (index, path) in written.iter().enumerate() {
             if written[..index].contains(path) {
                 return usage(format!("two outputs are called {}; give each its own name", path.display()));
@@ -150,6 +168,7 @@ impl TryFrom<RenderArgs> for RenderRequest {
             assignments: of_method,
             display_assignments: of_display,
             channels,
+            lightmap: args.lightmap,
             profile: args.profile,
             trace: args.trace,
             capture: args.capture,
@@ -282,13 +301,18 @@ pub fn check_validation(context: &Context) -> Result<(), AppError> {
     }
 }
 
-/// Where the driver's compiled pipelines are kept between runs: the user's cache folder, where there is one.
+/// Where the driver's compiled pipelines are kept between runs.
 fn pipeline_cache() -> Option<PathBuf> {
+    Some(cache_folder()?.join("pipelines.bin"))
+}
+
+/// What is kept between runs goes to the user's cache folder, where there is one.
+pub(super) fn cache_folder() -> Option<PathBuf> {
     let folder = std::env::var_os("XDG_CACHE_HOME")
         .map(PathBuf::from)
         .or_else(|| std::env::var_os("LOCALAPPDATA").map(PathBuf::from))
         .or_else(|| std::env::var_os("HOME").map(|home| PathBuf::from(home).join(".cache")))?;
-    folder.is_absolute().then(|| folder.join("linklight").join("pipelines.bin"))
+    folder.is_absolute().then(|| folder.join("linklight"))
 }
 
 #[cfg(test)]

@@ -149,7 +149,8 @@ fn flatten(scene: &Scene, request: &RenderRequest) -> Result<(Geometry, Vec<Vec3
     let rest = Pose::rest(scene);
     let fineness = match request.elements {
         Some(target) => Fineness::Elements(target),
-        None if request.display.is_some() => {
+        // A method on an atlas cuts the surface itself.
+        None if request.display.is_some() && request.method.key != "surface-shadow-maps" => {
             Fineness::Balanced { elements: DEFAULT_ELEMENTS, longest_edge: DEFAULT_LONGEST_EDGE }
         }
         None => {

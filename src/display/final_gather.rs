@@ -18,8 +18,10 @@ use crate::gpu::shaders::types::GatherCount;
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::report::tonemap::{Operator, ToneSettings};
 use crate::scene::camera::View;
+use crate::stages::bvh::Bvh;
 use crate::stages::film::Film;
 use crate::stages::sender_tree::{Representative, SenderTree, TreeOptions};
+use crate::stages::surface_maps::PlacedMaps;
 use crate::stages::trace::Tracer;
 use crate::stages::world::World;
 use glam::{UVec2, Vec3};
@@ -27,6 +29,10 @@ use glam::{UVec2, Vec3};
 crate::choice! {
     /// What decides whether a sender is seen.
     pub enum Visibility {
+        /// Surface shadow maps where the method has them, else rays
+        Auto = "auto",
+        /// Surface shadow maps of the senders
+        Maps = "maps",
         /// Rays, as `--rays` says
         Rays = "rays",
         /// Nothing: all are seen
@@ -40,7 +46,7 @@ crate::settings! {
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// What decides whether a sender is seen.
-        gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
+        gather_visibility: Visibility = Visibility::Auto, paper "surface shadow maps";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
@@ -103,6 +109,10 @@ pub struct Gathered<'a> {
     pub world: &'a World,
     pub tree: &'a SenderTree,
     pub tracer: Tracer<'a>,
+    /// Surface shadow maps of the tree's leaves, where there are any.
+    pub maps: Option<&'a PlacedMaps>,
+    /// What maps do not tell is traced by this.
+    pub bvh: &'a Bvh,
     pub shadow_maps: &'a ShadowMaps,
     pub g_buffer: &'a GBuffer,
     pub view: &'a View,
@@ -195,23 +205,39 @@ impl FinalGather {
                 recorder.dispatch(&pass, [film.width, film.height]);
             }};
         }
-        match from.tracer {
-            Tracer::Compute(bvh, surfaces) => gather!(
+        let sees_through = settings.gather_visibility == Visibility::None;
+        let by_maps = matches!(settings.gather_visibility, Visibility::Auto | Visibility::Maps);
+        let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = from.tracer;
+        match (from.tracer, from.maps.filter(|_| by_maps)) {
+            (_, Some(placed)) => gather!(
+                FinalGatherMaps,
+                FinalGatherMapsParams,
+                surfaces,
+                passes::FinalGatherMapsConstants { alpha_test: surfaces.has_holes },
+                bvh_nodes: from.bvh.nodes(),
+                bvh_triangles: from.bvh.triangles(),
+                map_frame: &placed.frame,
+                run_offsets: &placed.maps.run_offsets,
+                runs: &placed.maps.runs,
+                map_origins: &placed.maps.origins,
+                leaf_places: &placed.leaf_places
+            ),
+            (Tracer::Compute(bvh, surfaces), None) => gather!(
                 FinalGather,
                 FinalGatherParams,
                 surfaces,
                 passes::FinalGatherConstants {
                     alpha_test: surfaces.has_holes,
-                    sees_through: settings.gather_visibility == Visibility::None,
+                    sees_through,
                 },
                 bvh_nodes: bvh.nodes(),
                 bvh_triangles: bvh.triangles()
             ),
-            Tracer::RayQuery(structure, surfaces) => gather!(
+            (Tracer::RayQuery(structure, surfaces), None) => gather!(
                 FinalGatherRayQuery,
                 FinalGatherRayQueryParams,
                 surfaces,
-                passes::FinalGatherRayQueryConstants { alpha_test: surfaces.has_holes },
+                passes::FinalGatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through },
                 acceleration_structure: structure
             ),
         }

@@ -7,6 +7,7 @@
 //! | [`false_color`] | debug views: palettes, and the element under a pixel |
 //! | [`direct`] | what every display stage starts from: background, emission, punctual light |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
+//! | [`lightmap`] | the display stage that filters the texels of an atlas |
 //! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
 //!
 //! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
@@ -16,6 +17,7 @@ pub mod direct;
 pub mod false_color;
 pub mod final_gather;
 pub mod g_buffer;
+pub mod lightmap;
 pub mod shadow_maps;
 pub mod vertex;
 

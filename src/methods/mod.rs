@@ -10,12 +10,13 @@ mod papers;
 pub mod path_tracing;
 pub mod pick;
 pub mod settings;
+pub mod surface_shadow_maps;
 
 use serde_json::{Map, Value};
 
 pub use papers::{PAPERS, Paper};
 
-use papers::{DACHSBACHER_2007, DONG_2007, KAJIYA_1986, SCHMITZ_2008};
+use papers::{DACHSBACHER_2007, DONG_2007, KAJIYA_1986, RITSCHEL_2008, SCHMITZ_2008};
 use settings::{Assignment, SettingError, SettingGroup, Spec};
 
 /// Values of all settings by name, or what is wrong with an assignment.
@@ -65,6 +66,11 @@ pub const METHODS: &[Method] = &[
         "implicit-visibility",
         &DONG_2007,
         "no rays: in each direction bin of an element the nearest node of surfel trees wins, and its light is gathered",
+    ),
+    Method::new::<surface_shadow_maps::Settings>(
+        "surface-shadow-maps",
+        &RITSCHEL_2008,
+        "texels of an atlas gather from a tree of texels; compressed depth cube maps tell who sees whom",
     ),
     Method::new::<path_tracing::Settings>(
         "path-tracing",

@@ -51,6 +51,15 @@ pub(super) const KAJIYA_1986: Paper = Paper {
     doi: Some("10.1145/15922.15902"),
 };
 
+pub(super) const RITSCHEL_2008: Paper = Paper {
+    key: "Ritschel2008",
+    title: "Interactive Global Illumination Based on Coherent Surface Shadow Maps",
+    authors: "Tobias Ritschel, Thorsten Grosch, Jan Kautz, Hans-Peter Seidel",
+    year: 2008,
+    venue: "Graphics Interface 2008",
+    doi: None,
+};
+
 /// Everything cited, by key.
 pub const PAPERS: &[Paper] = &[
     Paper {
@@ -61,6 +70,14 @@ pub const PAPERS: &[Paper] = &[
         year: 2020,
         venue: "Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2)",
         doi: Some("10.1145/3406183"),
+    },
+    Paper {
+        key: "Baum1989",
+        title: "Improving Radiosity Solutions Through the Use of Analytically Determined Form-Factors",
+        authors: "Daniel R. Baum, Holly E. Rushmeier, James M. Winget",
+        year: 1989,
+        venue: "Computer Graphics 23(3), SIGGRAPH",
+        doi: Some("10.1145/74334.74367"),
     },
     Paper {
         key: "Blelloch1990",
@@ -161,6 +178,7 @@ pub const PAPERS: &[Paper] = &[
         venue: "ACM Transactions on Graphics 21(3), SIGGRAPH",
         doi: Some("10.1145/566654.566575"),
     },
+    RITSCHEL_2008,
     Paper {
         key: "Roberts2018",
         title: "The Unreasonable Effectiveness of Quasirandom Sequences",
@@ -193,6 +211,14 @@ pub const PAPERS: &[Paper] = &[
         year: 2019,
         venue: "Ray Tracing Gems",
         doi: Some("10.1007/978-1-4842-4427-2_6"),
+    },
+    Paper {
+        key: "Walter2005",
+        title: "Lightcuts: A Scalable Approach to Illumination",
+        authors: "Bruce Walter, Sebastian Fernandez, Adam Arbree, Kavita Bala, Michael Donikian, Donald P. Greenberg",
+        year: 2005,
+        venue: "ACM Transactions on Graphics 24(3), SIGGRAPH",
+        doi: Some("10.1145/1073204.1073318"),
     },
     Paper {
         key: "Walter2007",

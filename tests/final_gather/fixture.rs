@@ -83,6 +83,8 @@ impl Fixture {
             world: &self.world,
             tree: &tree,
             tracer: Tracer::compute(&self.bvh, &self.world),
+            maps: None,
+            bvh: &self.bvh,
             shadow_maps: &shadow_maps,
             g_buffer: &g_buffer,
             view: &self.view,

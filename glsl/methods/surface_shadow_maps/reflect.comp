@@ -3,15 +3,15 @@
 
 // One thread per texel: what arrived leaves again by the albedo, and adds to what left in all bounces so far.
 //                                                                                               [Ritschel2008 4.1]
-// reads irradiance (W/m2), albedo [texel_count]   updates reflected, reflected_sum, irradiance_sum [texel_count] (W/m2)
+// reads irradiance (W/m2), albedo [texel_count]   updates reflected, reflected_sum, indirect [texel_count] (W/m2)
 // shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 2, scalar) writeonly buffer Reflected { vec3 reflected[]; };
 layout(set = 0, binding = 3, scalar) buffer ReflectedSum { vec3 reflected_sum[]; };
-layout(set = 0, binding = 4, scalar) buffer IrradianceSum { vec3 irradiance_sum[]; };
-layout(push_constant, scalar) uniform Params { uint texel_count; } params;
+layout(set = 0, binding = 4, scalar) buffer IndirectIrradiance { vec3 indirect[]; };
+layout(push_constant, scalar) uniform Params { uint texel_count; uint is_indirect; } params;
 
 void main()
 {
@@ -20,5 +20,5 @@ void main()
     vec3 arrived = irradiance[texel];
     reflected[texel] = albedo[texel] * arrived;
     reflected_sum[texel] += albedo[texel] * arrived;
-    irradiance_sum[texel] += arrived;
+    if (params.is_indirect != 0) indirect[texel] += arrived;
 }

@@ -23,16 +23,17 @@
 //! [Ritschel2008]: crate::methods::PAPERS
 
 use crate::gpu::shaders::methods::surface_shadow_maps as passes;
-use crate::gpu::shaders::types::SurfaceMapFrame;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
 use crate::scene::atlas::{self, Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
 use crate::stages::sender_tree::{SenderTree, SenderTreeError, TreeOptions};
-use crate::stages::surface_maps::{MapInput, MapOptions, Sequence, SurfaceMapError, SurfaceMaps, map_offset};
+use crate::stages::surface_maps::{
+    MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
+};
 use crate::stages::texels::{self, Texels};
-use crate::stages::trace::{self, Tracer};
+use crate::stages::trace::Tracer;
 use crate::stages::work::Watch;
 use crate::stages::world::World;
 use glam::Vec3;
@@ -121,15 +122,6 @@ pub struct SurfaceShadowMaps {
     state: State,
 }
 
-/// The maps, and whose they are.
-pub struct PlacedMaps {
-    pub maps: SurfaceMaps,
-    /// Place in the sequence of each leaf of the tree, in tree order.
-    pub leaf_places: Buffer<u32>,
-    /// One: how the maps are read.
-    pub frame: Buffer<SurfaceMapFrame>,
-}
-
 /// Light of the texels, W/m2, `texel_count` entries each.
 struct State {
     emitted: Buffer<Vec3>,
@@ -139,7 +131,9 @@ struct State {
     irradiance: Buffer<Vec3>,
     reflected: Buffer<Vec3>,
     reflected_sum: Buffer<Vec3>,
-    irradiance_sum: Buffer<Vec3>,
+    /// From emitters and the environment.
+    direct: Buffer<Vec3>,
+    indirect: Buffer<Vec3>,
     cut_sizes: Buffer<u32>,
 }
 
@@ -178,7 +172,7 @@ impl SurfaceShadowMaps {
         let options = TreeOptions { normal_weight: settings.tree_normal_weight, ..TreeOptions::default() };
         let tree = SenderTree::build(context, &texels::leaves(&atlas), options)?;
         let maps = match settings.visibility {
-            TexelVisibility::Maps => Some(PlacedMaps::new(context, stage, &atlas, &tree, &settings)?),
+            TexelVisibility::Maps => Some(make_maps(context, stage, &atlas, &tree, &settings)?),
             TexelVisibility::Rays => None,
         };
         let state = State::new(context, texels.count as usize)?;
@@ -189,7 +183,7 @@ impl SurfaceShadowMaps {
     ///                                                                                       [Ritschel2008 4.1, Fig. 8]
     pub fn solve(&self, recorder: &mut Recorder<'_>, world: &World, tracer: &Tracer<'_>, bounces: u32) {
         let (texels, s) = (&self.texels, &self.state);
-        for sum in [&s.reflected_sum, &s.irradiance_sum, &s.dark] {
+        for sum in [&s.reflected_sum, &s.indirect, &s.dark] {
             recorder.fill(sum, 0);
         }
         let pass = passes::Emit {
@@ -201,15 +195,16 @@ impl SurfaceShadowMaps {
         recorder.scope("direct", |recorder| {
             self.tree.pull(recorder, &s.emitted, &s.dark);
             self.gather(recorder, tracer, 0);
-            texels.add_lights(recorder, tracer, world, self.settings.light_samples, &s.irradiance);
             texels.add_environment(recorder, tracer, world, self.settings.environment_rays, &s.irradiance);
-            self.reflect(recorder);
+            recorder.copy(&s.irradiance, &s.direct);
+            texels.add_lights(recorder, tracer, world, self.settings.light_samples, &s.irradiance);
+            self.reflect(recorder, false);
         });
         for bounce in 1..=bounces {
             recorder.scope(format_args!("bounce {bounce}"), |recorder| {
                 self.tree.pull(recorder, &s.dark, &s.reflected);
                 self.gather(recorder, tracer, bounce);
-                self.reflect(recorder);
+                self.reflect(recorder, true);
             });
         }
         self.tree.pull(recorder, &s.emitted, &s.reflected_sum);
@@ -277,7 +272,7 @@ impl SurfaceShadowMaps {
                 textures: surfaces.textures,
             }),
             (None, Tracer::RayQuery(structure, surfaces)) => gather!(GatherRayQuery, GatherRayQueryParams, {
-                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes },
+                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through: false },
                 acceleration_structure: structure,
                 triangles: surfaces.triangles,
                 triangle_materials: surfaces.triangle_materials,
@@ -289,15 +284,15 @@ impl SurfaceShadowMaps {
     }
 
     /// What arrived leaves again, and is kept.
-    fn reflect(&self, recorder: &mut Recorder<'_>) {
+    fn reflect(&self, recorder: &mut Recorder<'_>, is_indirect: bool) {
         let s = &self.state;
         let pass = passes::Reflect {
             irradiance: &s.irradiance,
             albedo: &self.texels.albedo,
             reflected: &s.reflected,
             reflected_sum: &s.reflected_sum,
-            irradiance_sum: &s.irradiance_sum,
-            params: passes::ReflectParams { texel_count: self.texels.count },
+            indirect: &s.indirect,
+            params: passes::ReflectParams { texel_count: self.texels.count, is_indirect: u32::from(is_indirect) },
         };
         recorder.dispatch(&pass, self.texels.count);
     }
@@ -307,9 +302,14 @@ impl SurfaceShadowMaps {
         &self.state.irradiance
     }
 
-    /// Of direct light and all bounces, W/m2 per texel.
-    pub fn irradiance(&self) -> &Buffer<Vec3> {
-        &self.state.irradiance_sum
+    /// From emitters and the environment, unreflected; W/m2 per texel.
+    pub fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.direct
+    }
+
+    /// Sum over bounces, W/m2 per texel.
+    pub fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.indirect
     }
 
     /// Nodes that each texel gathered from in the last bounce.
@@ -356,39 +356,26 @@ fn make_atlas(stage: &Stage<'_>, resolution: u32) -> Result<Atlas, AtlasError> {
     }
 }
 
-impl PlacedMaps {
-    fn new(
-        context: &Context,
-        stage: &Stage<'_>,
-        atlas: &Atlas,
-        tree: &SenderTree,
-        settings: &Settings,
-    ) -> Result<Self, SurfaceShadowMapsError> {
-        let options = MapOptions {
-            resolution: settings.map_resolution,
-            sequence: settings.sequence,
-            bias: settings.map_bias,
-        };
-        let holes: Vec<u8> = hole_content(stage.scene);
-        let content =
-            [bytemuck::cast_slice(stage.positions), bytemuck::cast_slice(&stage.geometry.triangles), &holes];
-        let input = MapInput {
-            atlas,
-            tracer: stage.tracer,
-            bounds: stage.bounds,
-            content: &content,
-            cache: stage.cache.filter(|_| settings.keep_maps),
-        };
-        let maps = SurfaceMaps::new(context, input, options, stage.watch)?;
-        let order = &tree.topology.leaf_order;
-        let leaf_places: Vec<u32> = order.iter().map(|&texel| maps.places[texel as usize]).collect();
-        let frame = maps.frame(settings.map_filter);
-        Ok(Self {
-            leaf_places: context.upload("surface_shadow_maps/leaf places", &leaf_places)?,
-            frame: context.upload("surface_shadow_maps/frame", &[frame])?,
-            maps,
-        })
-    }
+fn make_maps(
+    context: &Context,
+    stage: &Stage<'_>,
+    atlas: &Atlas,
+    tree: &SenderTree,
+    settings: &Settings,
+) -> Result<PlacedMaps, SurfaceShadowMapsError> {
+    let options =
+        MapOptions { resolution: settings.map_resolution, sequence: settings.sequence, bias: settings.map_bias };
+    let holes: Vec<u8> = hole_content(stage.scene);
+    let content = [bytemuck::cast_slice(stage.positions), bytemuck::cast_slice(&stage.geometry.triangles), &holes];
+    let input = MapInput {
+        atlas,
+        tracer: stage.tracer,
+        bounds: stage.bounds,
+        content: &content,
+        cache: stage.cache.filter(|_| settings.keep_maps),
+    };
+    let maps = SurfaceMaps::new(context, input, options, stage.watch)?;
+    Ok(PlacedMaps::new(context, maps, &tree.topology.leaf_order, settings.map_filter)?)
 }
 
 /// What decides which rays pass through holes: cutoffs and textures of masked materials.
@@ -412,7 +399,8 @@ impl State {
             irradiance: light("irradiance")?,
             reflected: light("reflected")?,
             reflected_sum: light("reflected sum")?,
-            irradiance_sum: light("irradiance sum")?,
+            direct: light("direct")?,
+            indirect: light("indirect")?,
             cut_sizes: context.buffer("surface_shadow_maps/cut sizes", count)?,
         })
     }

@@ -173,6 +173,27 @@ impl SurfaceMaps {
     }
 }
 
+/// The maps as the leaves of a sender tree ask them.
+pub struct PlacedMaps {
+    pub maps: SurfaceMaps,
+    /// Place in the sequence of each leaf, in tree order.
+    pub leaf_places: Buffer<u32>,
+    /// One: how the maps are read.
+    pub frame: Buffer<SurfaceMapFrame>,
+}
+
+impl PlacedMaps {
+    /// `leaf_order` gives the texel of each leaf of the tree.
+    pub fn new(context: &Context, maps: SurfaceMaps, leaf_order: &[u32], filters: bool) -> Result<Self, GpuError> {
+        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect();
+        Ok(Self {
+            leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
+            frame: context.upload("surface_maps/frame", &[maps.frame(filters)])?,
+            maps,
+        })
+    }
+}
+
 /// The maps of all places before compression, one after the other: what tests hold the compressed ones against.
 pub fn uncompressed(
     context: &Context,

@@ -1,0 +1,122 @@
+//! The method whose light lives on the texels of an atlas, with the display stages that show it.
+
+use super::AppError;
+use super::cli::Display;
+use super::frame::gather_samples;
+use super::render::{RenderRequest, cache_folder};
+use super::stage::Stage;
+use crate::display::final_gather::{FinalGather, Gathered};
+use crate::display::g_buffer::GBuffer;
+use crate::display::lightmap::{self, Lightmap, TexelLight};
+use crate::display::shadow_maps::ShadowMaps;
+use crate::gpu::Context;
+use crate::methods::surface_shadow_maps::{self, SurfaceShadowMaps};
+use crate::report::image::write_exr;
+use crate::stages::film::Film;
+use crate::stages::work::Watch;
+
+/// Surface shadow maps, ready to be shown.
+pub struct TexelsShown {
+    method: SurfaceShadowMaps,
+    shadow_maps: ShadowMaps,
+    g_buffer: GBuffer,
+    shown: Shown,
+}
+
+enum Shown {
+    FinalGather(FinalGather),
+    Lightmap(Lightmap),
+}
+
+impl TexelsShown {
+    pub fn prepare(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        watch: &dyn Watch,
+    ) -> Result<Self, AppError> {
+        let positions = context.download(&stage.world.positions)?;
+        let cache = cache_folder();
+        let of_scene = surface_shadow_maps::Stage {
+            scene: &stage.scene,
+            geometry: &stage.geometry,
+            positions: &positions,
+            bounds: stage.bounds,
+            world: &stage.world,
+            tracer: stage.tracer(),
+            tone: request.tone,
+            seed: request.seed,
+            cache: cache.as_deref(),
+            watch,
+        };
+        let method = SurfaceShadowMaps::prepare(context, &of_scene, request.settings()?).map_err(AppError::failed)?;
+        tracing::info!("{}", method.report());
+        let shown = match request.display {
+            Some(Display::Lightmap) => Shown::Lightmap(Lightmap::new(context, &method.atlas)?),
+            _ => {
+                let size = [request.width, request.height];
+                let settings = request.final_gather_settings()?;
+                Shown::FinalGather(FinalGather::new(context, size, settings, request.tone, request.seed)?)
+            }
+        };
+        let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+        let g_buffer = GBuffer::new(context, request.width, request.height)?;
+        Ok(Self { method, shadow_maps, g_buffer, shown })
+    }
+
+    pub fn frame(
+        &self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        film: &Film,
+        watch: &dyn Watch,
+    ) -> Result<(), AppError> {
+        let (world, method) = (&stage.world, &self.method);
+        // A final gather adds a bounce of its own; a lightmap shows what there is.
+        let gathers = matches!(self.shown, Shown::FinalGather(_));
+        let bounces = if gathers { request.bounces.saturating_sub(1) } else { request.bounces };
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("surface-shadow-maps", |recorder| {
+            method.solve(recorder, world, &stage.tracer(), bounces);
+            if gathers && request.bounces == 0 {
+                method.emit_only(recorder);
+            }
+        });
+        recorder.scope("display", |recorder| self.shadow_maps.draw(recorder, world, &stage.pose, stage.bounds));
+        recorder.submit()?;
+        if let Some(path) = &request.lightmap {
+            let [mut irradiance, indirect] =
+                [context.download(method.direct_irradiance())?, context.download(method.indirect_irradiance())?];
+            irradiance.iter_mut().zip(indirect).for_each(|(sum, value)| *sum += value);
+            write_exr(path, &lightmap::picture(&method.atlas, &irradiance)?)?;
+        }
+        match &self.shown {
+            Shown::FinalGather(display) => {
+                let gathered = Gathered {
+                    world,
+                    tree: &method.tree,
+                    tracer: stage.tracer(),
+                    maps: method.maps.as_ref(),
+                    bvh: &stage.bvh,
+                    shadow_maps: &self.shadow_maps,
+                    g_buffer: &self.g_buffer,
+                    view: &stage.view,
+                };
+                gather_samples(context, request, display, gathered, film, watch)
+            }
+            Shown::Lightmap(display) => {
+                let light = TexelLight {
+                    direct_irradiance: method.direct_irradiance(),
+                    indirect_irradiance: method.indirect_irradiance(),
+                };
+                let mut recorder = context.recorder("frame")?;
+                recorder.scope("display", |recorder| {
+                    let (shadow_maps, g_buffer) = (&self.shadow_maps, &self.g_buffer);
+                    display.draw(recorder, world, light, shadow_maps, g_buffer, &stage.view, request.spp, film);
+                });
+                Ok(recorder.submit()?)
+            }
+        }
+    }
+}
