@@ -111,7 +111,7 @@ impl Atlas {
         let count = charts.charts.len() as u32;
         let mut atlas = Self { resolution, scale: packing.scale, chart_count: count, ..Self::default() };
         // Sums per place of the square; a place belongs to one chart, since charts keep apart.
-        let mut found: Vec<(u32, u32, TexelPart)> = Vec::new();
+        let mut found: Vec<Found> = Vec::new();
         for (triangle, corners) in geometry.triangles.iter().enumerate() {
             let chart = charts.triangle_chart[triangle] as usize;
             let [a, b, c] = corners.map(|v| positions[v as usize]);
@@ -137,22 +137,23 @@ impl Atlas {
                         barycentrics,
                         area: covered.share / (0.5 * flat.abs()) * area,
                     };
-                    found.push((at.y * resolution + at.x, chart, part));
+                    let local = covered.centre - covered.texel.as_vec2();
+                    found.push(Found { place: at.y * resolution + at.x, chart, part, local, squares: covered.squares });
                 });
             }
         }
-        found.sort_by_key(|&(place, ..)| place);
+        found.sort_by_key(|found| found.place);
 
         atlas.texel_at = vec![NO_TEXEL; resolution as usize * resolution as usize];
-        for parts in found.chunk_by(|a, b| a.0 == b.0) {
-            let (place, chart, _) = parts[0];
+        for parts in found.chunk_by(|a, b| a.place == b.place) {
+            let Found { place, chart, .. } = parts[0];
             let is_back = chart >= count;
             let texel =
                 texel(geometry, positions, &atlas, parts, is_back, UVec2::new(place % resolution, place / resolution));
             if texel.area > 0.0 && texel.normal != Vec3::ZERO {
                 atlas.texel_at[place as usize] = atlas.texels.len() as u32;
                 atlas.texels.push(Texel { chart, first_part: atlas.parts.len() as u32, ..texel });
-                atlas.parts.extend(parts.iter().map(|&(.., part)| part));
+                atlas.parts.extend(parts.iter().map(|found| found.part));
             }
         }
         atlas
@@ -165,18 +166,25 @@ impl Atlas {
     }
 }
 
+/// A part on its way into its texel.
+struct Found {
+    /// Row by row.
+    place: u32,
+    chart: u32,
+    part: TexelPart,
+    /// Its centroid and its mean squared coordinates, in texels from the texel's corner.
+    local: Vec2,
+    squares: Vec2,
+}
+
 /// Sums the parts up: area, centroid, mean normal, and the mean of what a step of a texel to the right and down is in
 /// space.
-fn texel(
-    geometry: &Geometry,
-    positions: &[Vec3],
-    atlas: &Atlas,
-    parts: &[(u32, u32, TexelPart)],
-    is_back: bool,
-    at: UVec2,
-) -> Texel {
+fn texel(geometry: &Geometry, positions: &[Vec3], atlas: &Atlas, parts: &[Found], is_back: bool, at: UVec2) -> Texel {
     let (mut area, mut position, mut normal, mut u, mut v) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
-    for (.., part) in parts {
+    let (mut local, mut squares) = (Vec2::ZERO, Vec2::ZERO);
+    for Found { part, local: part_local, squares: part_squares, .. } in parts {
+        local += part.area * part_local;
+        squares += part.area * part_squares;
         let triangle = part.triangle as usize;
         let [a, b, c] = geometry.triangles[triangle].map(|vertex| positions[vertex as usize]);
         let [p, q, r] = atlas.corner_places[usize::from(is_back)][triangle];
@@ -192,8 +200,11 @@ fn texel(
         return Texel { at, chart: 0, position, normal: Vec3::ZERO, area: 0.0, side_u: u, side_v: v, first_part: 0 };
     }
     let normal = if is_back { -normal } else { normal }.normalize_or_zero();
-    // Sides in the plane across the normal, around it the right way, as large as the area.
+    // Sides in the plane across the normal, around it the right way, as large as the area; in each direction as long as a
+    // rectangle that spreads as far, so that a strip along a border stays on its side of the border.
+    let spread = (12.0 * (squares / area - (local / area).powf(2.0))).max(Vec2::splat(1e-6));
     let [u, v] = [u, v].map(|side| (side - normal * side.dot(normal)) / area);
+    let (u, v) = (u * spread.x.sqrt(), v * spread.y.sqrt());
     let across = u.cross(v).dot(normal);
     let (u, v) = if across < 0.0 { (v, u) } else { (u, v) };
     let (side_u, side_v) = if across.abs() > 1e-3 * u.length() * v.length() && across.is_finite() {

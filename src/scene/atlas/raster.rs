@@ -10,6 +10,8 @@ pub(super) struct Covered {
     pub share: f32,
     /// Centroid of the part.
     pub centre: Vec2,
+    /// Mean of the squared coordinates over the part, from the texel's corner.
+    pub squares: Vec2,
 }
 
 /// Calls `found` for each texel that the triangle (texel units, any winding) covers a part of.
@@ -27,9 +29,9 @@ pub(super) fn cover(triangle: [Vec2; 3], mut found: impl FnMut(Covered)) {
                 clip(&polygon, &mut clipped, |p| sign * (p[axis] - bound));
                 std::mem::swap(&mut polygon, &mut clipped);
             }
-            let (area, centre) = area_and_centre(&polygon);
+            let (area, centre, squares) = moments(&polygon);
             if area > 0.0 {
-                found(Covered { texel: UVec2::new(x, y), share: area, centre: corner + centre });
+                found(Covered { texel: UVec2::new(x, y), share: area, centre: corner + centre, squares });
             }
         }
     }
@@ -50,16 +52,18 @@ fn clip(polygon: &[Vec2], kept: &mut Vec<Vec2>, height: impl Fn(Vec2) -> f32) {
     }
 }
 
-/// Unsigned area and centroid of a convex polygon.
-fn area_and_centre(polygon: &[Vec2]) -> (f32, Vec2) {
-    let Some((&first, rest)) = polygon.split_first() else { return (0.0, Vec2::ZERO) };
-    let (mut area, mut moment) = (0.0, Vec2::ZERO);
+/// Unsigned area, centroid, and mean squared coordinates of a convex polygon.
+fn moments(polygon: &[Vec2]) -> (f32, Vec2, Vec2) {
+    let Some((&first, rest)) = polygon.split_first() else { return (0.0, Vec2::ZERO, Vec2::ZERO) };
+    let (mut area, mut centre, mut squares) = (0.0, Vec2::ZERO, Vec2::ZERO);
     for pair in rest.windows(2) {
         let part = 0.5 * (pair[0] - first).perp_dot(pair[1] - first);
+        let sum = first + pair[0] + pair[1];
         area += part;
-        moment += part * (first + pair[0] + pair[1]) / 3.0;
+        centre += part * sum / 3.0;
+        squares += part * (first * first + pair[0] * pair[0] + pair[1] * pair[1] + sum * sum) / 12.0;
     }
-    if area == 0.0 { (0.0, first) } else { (area.abs(), moment / area) }
+    if area == 0.0 { (0.0, first, first * first) } else { (area.abs(), centre / area, squares / area) }
 }
 
 #[cfg(test)]

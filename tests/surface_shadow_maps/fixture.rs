@@ -1,0 +1,85 @@
+//! A scene on the device, ready for the method.
+
+use crate::common::TestContext;
+use glam::Vec3;
+use linklight::gpu::Context;
+use linklight::methods::surface_shadow_maps::{Settings, Stage, SurfaceShadowMaps};
+use linklight::report::tonemap::ToneSettings;
+use linklight::scene::atlas::Atlas;
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::pose::Pose;
+use linklight::scene::{LoadOptions, Scene, builtin, deform};
+use linklight::stages::bvh::Bvh;
+use linklight::stages::surface_maps::{MapInput, MapOptions, Sequence};
+use linklight::stages::trace::Tracer;
+use linklight::stages::work::{Unwatched, Watch};
+use linklight::stages::world::World;
+use std::path::Path;
+
+pub struct Fixture {
+    pub scene: Scene,
+    pub geometry: Geometry,
+    pub positions: Vec<Vec3>,
+    pub bounds: [Vec3; 2],
+    pub world: World,
+    pub bvh: Bvh,
+}
+
+pub fn builtin_scene(name: &str) -> Scene {
+    builtin::open(&format!("builtin:{name}"), &LoadOptions::default()).unwrap()
+}
+
+impl Fixture {
+    pub fn new(context: &TestContext, scene: Scene, environment: &Environment) -> Self {
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let pose = Pose::rest(&scene);
+        let world = World::new(context, &scene, &geometry, &pose, environment, true).unwrap();
+        let vertices = deform::world_vertices(&geometry, &pose);
+        let bounds = vertices.bounds().unwrap();
+        let positions = context.download(&world.positions).unwrap();
+        let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
+        Self { scene, geometry, positions, bounds, world, bvh }
+    }
+
+    pub fn tracer(&self) -> Tracer<'_> {
+        Tracer::compute(&self.bvh, &self.world)
+    }
+
+    pub fn atlas(&self, resolution: u32) -> Atlas {
+        Atlas::new(&self.scene, &self.geometry, &self.positions, resolution).unwrap()
+    }
+
+    pub fn map_input<'a>(&'a self, atlas: &'a Atlas, cache: Option<&'a Path>) -> MapInput<'a> {
+        MapInput { atlas, tracer: self.tracer(), bounds: self.bounds, content: &[], cache }
+    }
+
+    pub fn stage<'a>(&'a self, cache: Option<&'a Path>, watch: &'a dyn Watch) -> Stage<'a> {
+        Stage {
+            scene: &self.scene,
+            geometry: &self.geometry,
+            positions: &self.positions,
+            bounds: self.bounds,
+            world: &self.world,
+            tracer: self.tracer(),
+            tone: ToneSettings::default(),
+            seed: 3,
+            cache,
+            watch,
+        }
+    }
+
+    pub fn prepare(&self, context: &TestContext, settings: Settings) -> SurfaceShadowMaps {
+        SurfaceShadowMaps::prepare(context, &self.stage(None, &Unwatched), settings).unwrap()
+    }
+
+    pub fn solve(&self, context: &Context, method: &SurfaceShadowMaps, bounces: u32) {
+        let mut recorder = context.recorder("test").unwrap();
+        method.solve(&mut recorder, &self.world, &self.tracer(), bounces);
+        recorder.submit().unwrap();
+    }
+}
+
+pub fn options(resolution: u32, sequence: Sequence) -> MapOptions {
+    MapOptions { resolution, sequence, bias: 1.0 }
+}

@@ -1,0 +1,7 @@
+//! Surface shadow maps: compressed maps against uncompressed ones, the cache, the solution on the atlas.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod fixture;
+mod maps;
+mod solve;

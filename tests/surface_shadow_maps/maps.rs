@@ -1,0 +1,162 @@
+//! Maps: every compressed answer is the uncompressed one, on the host and on the device; ratios; the cache.
+
+use crate::common::{Random, TestContext};
+use crate::fixture::{Fixture, builtin_scene, options};
+use glam::Vec3;
+use linklight::gpu::shaders::types::SurfaceMapQuery;
+use linklight::scene::environment::Environment;
+use linklight::stages::surface_maps::{Interval, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed};
+use linklight::stages::work::{Interrupted, Unwatched, Watch};
+
+const SEQUENCES: [Sequence; 3] = [Sequence::Greedy, Sequence::ZigZag, Sequence::Spiral];
+
+/// The first depth that its interval does not hold.
+fn first_wrong(maps: &SurfaceMaps, intervals: &[Interval]) -> Option<(usize, usize)> {
+    let pixels = maps.maps.pixel_count();
+    let count = intervals.len() / pixels;
+    (0..count)
+        .flat_map(|place| (0..pixels).map(move |pixel| (place, pixel)))
+        .find(|&(place, pixel)| !intervals[place * pixels + pixel].contains(maps.maps.depth(place as u32, pixel)))
+}
+
+#[test]
+fn every_compressed_depth_answers_like_the_uncompressed_map() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let atlas = fixture.atlas(32);
+    for walk in SEQUENCES {
+        let order = sequence::walk(&atlas, walk);
+        let input = fixture.map_input(&atlas, None);
+        let maps = SurfaceMaps::new(&context, input, options(8, walk), &Unwatched).unwrap();
+        let intervals = uncompressed(&context, input, options(8, walk), &order, &Unwatched).unwrap();
+        assert_eq!(intervals.len(), order.len() * maps.maps.pixel_count());
+        println!("{walk:?}: {} texels, {:.2} : 1", order.len(), maps.maps.ratio());
+        assert_eq!(first_wrong(&maps, &intervals), None);
+        let mut other = order.clone();
+        other.reverse();
+        let reversed = uncompressed(&context, input, options(8, walk), &other, &Unwatched).unwrap();
+        assert!(first_wrong(&maps, &reversed).is_some(), "a wrong order would go unnoticed");
+    }
+}
+
+/// On the device: points on the near side of the first surface are seen, those on the far side of the second are not.
+#[test]
+fn queries_on_the_device_agree_with_the_intervals() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let atlas = fixture.atlas(32);
+    let resolution = 16;
+    let order = sequence::walk(&atlas, Sequence::Spiral);
+    let input = fixture.map_input(&atlas, None);
+    let maps = SurfaceMaps::new(&context, input, options(resolution, Sequence::Spiral), &Unwatched).unwrap();
+    let intervals = uncompressed(&context, input, options(resolution, Sequence::Spiral), &order, &Unwatched).unwrap();
+    let origins = context.download(&maps.origins).unwrap();
+    let random = &mut Random(17);
+    let (mut queries, mut expected) = (Vec::new(), Vec::new());
+    while queries.len() < 20_000 {
+        let place = random.below(order.len() as u32);
+        let pixel = random.below(maps.maps.pixel_count() as u32);
+        let interval = intervals[place as usize * maps.maps.pixel_count() + pixel as usize];
+        let is_seen = random.below(2) == 0;
+        // Codes at the ends of the interval, moved by more than rounding.
+        let code = if is_seen { f32::from(interval.low) - 0.5 } else { f32::from(interval.high) + 1.5 };
+        if interval == Interval::ANY || code < 20.0 || code > 65_000.0 {
+            continue;
+        }
+        let point = origins[place as usize] + direction(pixel, resolution) * (code / maps.codes_per_metre);
+        queries.push(SurfaceMapQuery { point, place });
+        expected.push(f32::from(u8::from(is_seen)));
+    }
+    assert!(expected.iter().filter(|&&seen| seen == 0.0).count() > 1000);
+    let buffer = context.upload("test/queries", &queries).unwrap();
+    let visibility = context.buffer("test/visibility", queries.len()).unwrap();
+    for filters in [false, true] {
+        let mut recorder = context.recorder("test").unwrap();
+        maps.query(&mut recorder, &buffer, &visibility, queries.len(), filters);
+        recorder.submit().unwrap();
+        let got = context.download(&visibility).unwrap();
+        let wrong = got.iter().zip(&expected).filter(|(got, expected)| (**got - **expected).abs() > 1e-3).count();
+        println!("filters {filters}: {wrong} of {} answers differ", queries.len());
+        // At the middle of a pixel no other counts.
+        assert!(wrong == 0, "{wrong} wrong answers");
+    }
+}
+
+/// Through the middle of a pixel; the twin of `cube_pixel_direction`.
+fn direction(pixel: u32, resolution: u32) -> Vec3 {
+    let (face, within) = (pixel / (resolution * resolution), pixel % (resolution * resolution));
+    let at = |k: u32| (k as f32 + 0.5) * 2.0 / resolution as f32 - 1.0;
+    let (x, y) = (at(within % resolution), at(within / resolution));
+    let s = if face % 2 == 0 { 1.0 } else { -1.0 };
+    match face / 2 {
+        0 => Vec3::new(s, x, y),
+        1 => Vec3::new(x, s, y),
+        _ => Vec3::new(x, y, s),
+    }
+    .normalize()
+}
+
+/// Beside [Ritschel2008 Table 2]: 7.4, 11.7, 16.9 : 1 along spirals at 32, 64 and 128 texels a side.
+#[test]
+fn charts_compress_better_than_greedy_walks_and_more_so_when_finer() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let mut before = 0.0;
+    for resolution in [32, 64] {
+        let atlas = fixture.atlas(resolution);
+        let ratio = |walk| {
+            let input = fixture.map_input(&atlas, None);
+            SurfaceMaps::new(&context, input, options(8, walk), &Unwatched).unwrap().maps.ratio()
+        };
+        let [greedy, zig_zag, spiral] = SEQUENCES.map(ratio);
+        println!(
+            "{resolution} x {resolution} texels: greedy {greedy:.2}, zig-zag {zig_zag:.2}, spiral {spiral:.2} : 1"
+        );
+        assert!(spiral > greedy && spiral > zig_zag, "{greedy} {zig_zag} {spiral}");
+        assert!(spiral > before, "{spiral} after {before}");
+        before = spiral;
+    }
+}
+
+/// Wants no more work after so many steps.
+struct Stops(std::cell::Cell<u32>);
+
+impl Watch for Stops {
+    fn step(&self, _: &str, _: u64, _: u64) -> Result<(), Interrupted> {
+        self.0.set(self.0.get().saturating_sub(1));
+        if self.0.get() == 0 { Err(Interrupted) } else { Ok(()) }
+    }
+}
+
+#[test]
+fn maps_are_kept_whole_or_not_at_all() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let atlas = fixture.atlas(32);
+    let folder = tempfile::tempdir().unwrap();
+    let input = fixture.map_input(&atlas, Some(folder.path()));
+    let make =
+        |resolution, watch: &dyn Watch| SurfaceMaps::new(&context, input, options(resolution, Sequence::ZigZag), watch);
+    let files = || std::fs::read_dir(folder.path()).unwrap().map(|f| f.unwrap().path()).collect::<Vec<_>>();
+
+    let stopped = make(32, &Stops(2.into()));
+    assert!(matches!(stopped, Err(SurfaceMapError::Interrupted(_))));
+    assert!(files().is_empty(), "an interrupted run leaves nothing");
+
+    let first = make(8, &Unwatched).unwrap();
+    assert!(first.ray_count > 0);
+    let again = make(8, &Unwatched).unwrap();
+    assert!(again.ray_count == 0 && again.maps == first.maps, "read from disk");
+    assert!(make(10, &Unwatched).unwrap().ray_count > 0, "other settings, other maps");
+    assert_eq!(files().len(), 2);
+
+    for file in files() {
+        let mut bytes = std::fs::read(&file).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 0x10;
+        std::fs::write(&file, bytes).unwrap();
+    }
+    let rebuilt = make(8, &Unwatched).unwrap();
+    assert!(rebuilt.ray_count > 0 && rebuilt.maps == first.maps, "a damaged file is replaced");
+    assert_eq!(make(8, &Unwatched).unwrap().ray_count, 0);
+}
