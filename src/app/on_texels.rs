@@ -25,7 +25,7 @@ pub struct TexelsShown {
 
 enum Shown {
     FinalGather(FinalGather),
-    Lightmap(Lightmap),
+    Lightmap(Box<Lightmap>),
 }
 
 impl TexelsShown {
@@ -52,7 +52,7 @@ impl TexelsShown {
         let method = SurfaceShadowMaps::prepare(context, &of_scene, request.settings()?).map_err(AppError::failed)?;
         tracing::info!("{}", method.report());
         let shown = match request.display {
-            Some(Display::Lightmap) => Shown::Lightmap(Lightmap::new(context, &method.atlas)?),
+            Some(Display::Lightmap) => Shown::Lightmap(Box::new(Lightmap::new(context, &method.atlas)?)),
             _ => {
                 let size = [request.width, request.height];
                 let settings = request.final_gather_settings()?;

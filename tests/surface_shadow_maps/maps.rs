@@ -60,7 +60,7 @@ fn queries_on_the_device_agree_with_the_intervals() {
         let is_seen = random.below(2) == 0;
         // Codes at the ends of the interval, moved by more than rounding.
         let code = if is_seen { f32::from(interval.low) - 0.5 } else { f32::from(interval.high) + 1.5 };
-        if interval == Interval::ANY || code < 20.0 || code > 65_000.0 {
+        if interval == Interval::ANY || !(20.0..=65_000.0).contains(&code) {
             continue;
         }
         let point = origins[place as usize] + direction(pixel, resolution) * (code / maps.codes_per_metre);

@@ -196,7 +196,7 @@ fn texel(geometry: &Geometry, positions: &[Vec3], atlas: &Atlas, parts: &[Found]
         u += part.area * ((b - a) * e2.y - (c - a) * e1.y) / flat;
         v += part.area * ((c - a) * e1.x - (b - a) * e2.x) / flat;
     }
-    if !(area > 0.0) {
+    if area <= 0.0 || area.is_nan() {
         return Texel { at, chart: 0, position, normal: Vec3::ZERO, area: 0.0, side_u: u, side_v: v, first_part: 0 };
     }
     let normal = if is_back { -normal } else { normal }.normalize_or_zero();
