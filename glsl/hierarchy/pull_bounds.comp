@@ -2,8 +2,8 @@
 #include "lib/prelude.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per node of one level: an inner node's area, centre of area and bounding sphere from its children's.
-// reads level_nodes[node_count]   updates nodes[node_count]; the level below is already done   shared none
+// One thread per inner node of one level: area, centre of area and bounding sphere from the children's.
+// reads level_nodes   updates nodes[node_count]; the level below is already done   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer LevelNodes { uint level_nodes[]; };
 layout(set = 0, binding = 1, scalar) buffer Nodes { HierarchyNode nodes[]; };
@@ -14,7 +14,6 @@ void main()
     uint k = linear_index();
     if (k >= params.count) return;
     uint node = level_nodes[params.first + k];
-    if (nodes[node].leaf != NONE) return;
 
     uint end = nodes[node].skip;
     vec3 weighted = vec3(0.0), sum = vec3(0.0);

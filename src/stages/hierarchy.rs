@@ -241,6 +241,7 @@ pub struct Hierarchy {
     pub plan: HierarchyPlan,
     pub nodes: Buffer<HierarchyNode>,
     pub leaves: Buffer<HierarchyLeaf>,
+    /// Of inner nodes.
     pub levels: Levels,
 }
 
@@ -250,7 +251,7 @@ impl Hierarchy {
         let hierarchy = Self {
             nodes: context.upload("hierarchy/nodes", &plan.nodes)?,
             leaves: context.upload("hierarchy/leaves", &plan.leaves)?,
-            levels: Levels::new(context, "hierarchy", &plan.depths)?,
+            levels: Levels::new(context, "hierarchy", &plan.depths, |node| plan.nodes[node as usize].leaf == NONE)?,
             plan,
         };
         let mut recorder = context.recorder("hierarchy")?;

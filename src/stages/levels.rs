@@ -14,9 +14,14 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// `depths[node]`: 0 for roots.
-    pub fn new(context: &Context, owner: &str, depths: &[u32]) -> Result<Self, GpuError> {
-        let (nodes, ranges) = by_depth(depths);
+    /// The nodes that `is_swept`; `depths[node]` is 0 for roots.
+    pub fn new(
+        context: &Context,
+        owner: &str,
+        depths: &[u32],
+        is_swept: impl Fn(u32) -> bool,
+    ) -> Result<Self, GpuError> {
+        let (nodes, ranges) = by_depth(depths, is_swept);
         Ok(Self { nodes: context.upload(&format!("{owner}/level nodes"), &nodes)?, ranges })
     }
 
@@ -32,8 +37,8 @@ impl Levels {
 }
 
 /// Nodes sorted by depth, and where each depth's are.
-pub fn by_depth(depths: &[u32]) -> (Vec<u32>, Vec<Range<u32>>) {
-    let mut nodes: Vec<u32> = (0..depths.len() as u32).collect();
+fn by_depth(depths: &[u32], is_swept: impl Fn(u32) -> bool) -> (Vec<u32>, Vec<Range<u32>>) {
+    let mut nodes: Vec<u32> = (0..depths.len() as u32).filter(|&node| is_swept(node)).collect();
     nodes.sort_by_key(|&node| depths[node as usize]);
     let ranges = nodes.chunk_by(|&a, &b| depths[a as usize] == depths[b as usize]);
     let mut first = 0;
@@ -52,9 +57,11 @@ mod tests {
 
     #[test]
     fn nodes_stand_by_depth_and_rise_within_it() {
-        let (nodes, ranges) = by_depth(&[0, 1, 2, 2, 1, 2]);
+        let (nodes, ranges) = by_depth(&[0, 1, 2, 2, 1, 2], |_| true);
         assert_eq!(nodes, [0, 1, 4, 2, 3, 5]);
         assert_eq!(ranges, [0..1, 1..3, 3..6]);
-        assert!(by_depth(&[]).1.is_empty());
+        let (nodes, ranges) = by_depth(&[0, 1, 2, 2, 1, 2], |node| node % 2 == 0);
+        assert_eq!((nodes, ranges), (vec![0, 4, 2], vec![0..1, 1..2, 2..3]));
+        assert!(by_depth(&[], |_| true).1.is_empty());
     }
 }

@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
@@ -16,7 +17,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { vec3 bin_di
 layout(set = 0, binding = 5, scalar) readonly buffer SpreadOffsets { uint spread_offsets[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Spread { SpreadEntry spread[]; };
 layout(set = 0, binding = 7, scalar) buffer CellOffsets { uint cell_offsets[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer Transfers { uvec2 transfers[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Transfers { uint64_t transfers[]; };
 layout(push_constant, scalar) uniform Params {
     BinParams bins;
     uint link_count;
@@ -30,7 +31,7 @@ layout(push_constant, scalar) uniform Params {
 void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight)
 {
     uint slot = atomicAdd(cell_offsets[receiver * params.bins.count + receiver_bin], 1);
-    transfers[slot - params.first_transfer] = uvec2(sender * params.bins.count + sender_bin, floatBitsToUint(weight));
+    transfers[slot - params.first_transfer] = packUint2x32(uvec2(sender * params.bins.count + sender_bin, floatBitsToUint(weight)));
 }
 
 void main()

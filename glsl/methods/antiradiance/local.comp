@@ -1,32 +1,35 @@
 #version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
 // Eight threads per leaf: incident radiance becomes irradiance of both sides, reflected radiance, and antiradiance, which
 // goes on where the light came from, negated.                                       [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
-// reads leaves, cosine_norms, bin_directions, incident[node_count * bin_count], environment[bin_count] (W m^-2 sr^-1),
+// reads leaves, nodes, cosine_norms, bin_directions, incident[node_count * BIN_COUNT] (pushed down to
+//       the parents of leaves), environment[BIN_COUNT] (W m^-2 sr^-1),
 //       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count]
 // updates radiosity[2 leaf_count] (W/m2), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
 // writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
 // shared 64 x (irradiance of both sides, residuals)
 // Differs from [Dachsbacher2007]: one leaf is both sides of a surface; open surfaces take away light from behind as well.
 layout(local_size_x = 64) in;
-layout(constant_id = 0) const uint WORDS = 3;    // of an entry of the tables: 3 (f32) or 2 (f16)
+layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
+layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Incident { uint incident[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Environment { vec3 environment[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Source { vec3 source[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 7, scalar) buffer Radiosity { vec3 radiosity[]; };
-layout(set = 0, binding = 8, scalar) buffer Exitant { uint exitant[]; };
+layout(set = 0, binding = 8, scalar) buffer Exitant { uint64_t exitant[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 10, scalar) writeonly buffer Residuals { vec2 residuals[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
-    uint bin_count;
     uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
@@ -38,9 +41,11 @@ const uint LANES = 8;       // threads of a leaf
 shared vec3 sh_front[64], sh_back[64];
 shared vec2 sh_residual[64];
 
-vec3 incident_in(uint row, uint bin)
+// What the leaf received itself and what its ancestors did, which stands with its parent.
+vec3 incident_in(uint row, uint parent_row, uint bin)
 {
     vec3 arriving = LOAD_ENTRY(incident, row + bin);
+    if (parent_row != NONE) arriving += LOAD_ENTRY(incident, parent_row + bin);
     return params.add_environment != 0 ? arriving + environment[bin] : arriving;
 }
 
@@ -51,15 +56,16 @@ void main()
     uint wanted = linear_index() / LANES, leaf = min(wanted, params.leaf_count - 1);
     bool is_own = wanted < params.leaf_count;
     HierarchyLeaf own = leaves[leaf];
-    uint row = own.node * params.bin_count;
+    uint parent = nodes[own.node].parent;
+    uint row = own.node * BIN_COUNT, parent_row = parent == NONE ? NONE : parent * BIN_COUNT;
     bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0, reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
-    float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(params.bin_count);
+    float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
 
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
-    for (uint bin = lane; bin < params.bin_count; bin += LANES) {
+    for (uint bin = lane; bin < BIN_COUNT; bin += LANES) {
         float cosine = dot(own.normal, bin_directions[bin]);
-        vec3 arriving = discrete_cosine(cosine, norm, params.bin_count) * bin_solid_angle * incident_in(row, bin);
+        vec3 arriving = discrete_cosine(cosine, norm, BIN_COUNT) * bin_solid_angle * incident_in(row, parent_row, bin);
         if (cosine <= 0.0) front += arriving;
         else back += arriving;
     }
@@ -80,12 +86,12 @@ void main()
     }
 
     vec2 residual = vec2(0.0);      // change, sum
-    for (uint bin = lane; bin < params.bin_count; bin += LANES) {
+    for (uint bin = lane; bin < BIN_COUNT; bin += LANES) {
         float cosine = dot(own.normal, bin_directions[bin]);
         bool leaves_front = cosine > 0.0;
         vec3 radiance = (leaves_front ? b_front : b_back) / PI;
-        if (!leaves_front || blocks_behind) radiance -= incident_in(row, bin);
-        vec3 intensity = discrete_cosine(cosine, norm, params.bin_count) * radiance;
+        if (!leaves_front || blocks_behind) radiance -= incident_in(row, parent_row, bin);
+        vec3 intensity = discrete_cosine(cosine, norm, BIN_COUNT) * radiance;
         vec3 change = abs(intensity - LOAD_ENTRY(exitant, row + bin));
         residual += vec2(change.r + change.g + change.b, abs(intensity.r) + abs(intensity.g) + abs(intensity.b));
         if (is_own) STORE_ENTRY(exitant, row + bin, intensity);

@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 
 // One thread per cell (a bin of a receiver) of a window: its transfers by rising sender, so that sums do not depend on the
@@ -6,7 +7,7 @@
 // reads cell_offsets[node_count * bin_count + 1] (ends of cells)   updates transfers[window]   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer CellOffsets { uint cell_offsets[]; };
-layout(set = 0, binding = 1, scalar) buffer Transfers { uvec2 transfers[]; };
+layout(set = 0, binding = 1, scalar) buffer Transfers { uint64_t transfers[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_cell;
     uint cell_count;
@@ -26,9 +27,10 @@ void main()
     for (uint g = 0; g < 6; ++g) {
         uint gap = gaps[g];
         for (uint k = gap; k < count; ++k) {
-            uvec2 moved = transfers[first + k];
+            uint64_t moved = transfers[first + k];
+            uint sender = unpackUint2x32(moved).x;
             uint at = k;
-            while (at >= gap && transfers[first + at - gap].x > moved.x) {
+            while (at >= gap && unpackUint2x32(transfers[first + at - gap]).x > sender) {
                 transfers[first + at] = transfers[first + at - gap];
                 at -= gap;
             }

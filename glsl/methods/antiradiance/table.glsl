@@ -1,24 +1,28 @@
 #ifndef TABLE
 #define TABLE
-// Entries of a table of colours: three f32, or three f16 in two words.
-// The kernel declares the specialisation constant WORDS and unsized arrays of words for the tables it binds.
+// Entries of a table of colours, node by node and bin by bin: three f16 in 64 bits, or three f32 in twice that. Long words
+// make few loads, which is what these passes wait for.
+// The kernel declares the specialisation constant WORDS (1 or 2 a entry) and arrays of uint64_t for the tables it binds.
 
-vec3 entry_of_words(uint a, uint b, uint c)
+vec3 entry_of_words(uint64_t first, uint64_t second)
 {
-    if (WORDS == 2) return vec3(unpackHalf2x16(a), unpackHalf2x16(b).x);
-    return uintBitsToFloat(uvec3(a, b, c));
+    uvec2 a = unpackUint2x32(first);
+    if (WORDS == 1) return vec3(unpackHalf2x16(a.x), unpackHalf2x16(a.y).x);
+    return uintBitsToFloat(uvec3(a, unpackUint2x32(second).x));
 }
 
-uvec3 words_of_entry(vec3 value)
+uint64_t first_word(vec3 value)
 {
-    // The largest f16, so that what overflows stays finite and is seen in the residual.
-    if (WORDS == 2) {
+    // At most the largest f16, so that what overflows stays finite and is seen in the residual.
+    if (WORDS == 1) {
         value = clamp(value, vec3(-65504.0), vec3(65504.0));
-        return uvec3(packHalf2x16(value.xy), packHalf2x16(vec2(value.z, 0.0)), 0u);
+        return packUint2x32(uvec2(packHalf2x16(value.xy), packHalf2x16(vec2(value.z, 0.0))));
     }
-    return floatBitsToUint(value);
+    return packUint2x32(floatBitsToUint(value.xy));
 }
 
-#define LOAD_ENTRY(words, index) entry_of_words(words[(index) * WORDS], words[(index) * WORDS + 1], WORDS == 2 ? 0u : words[(index) * WORDS + 2])
-#define STORE_ENTRY(words, index, value) { uvec3 stored = words_of_entry(value); words[(index) * WORDS] = stored.x; words[(index) * WORDS + 1] = stored.y; if (WORDS == 3) words[(index) * WORDS + 2] = stored.z; }
+uint64_t second_word(vec3 value) { return packUint2x32(uvec2(floatBitsToUint(value.z), 0u)); }
+
+#define LOAD_ENTRY(words, index) entry_of_words(words[(index) * WORDS], words[(index) * WORDS + (WORDS - 1)])
+#define STORE_ENTRY(words, index, value) { words[(index) * WORDS] = first_word(value); if (WORDS == 2) words[(index) * WORDS + (WORDS - 1)] = second_word(value); }
 #endif

@@ -14,6 +14,9 @@ use std::ops::Range;
 
 /// Pairs of one step of the queue.
 const QUEUE_BATCH: u32 = 8192;
+/// Classes of cells by length, and cells of one workgroup, in `work_classes.glsl` and its kernels.
+const WORK_CLASSES: usize = 16;
+const WORK_CELLS: u32 = 1024;
 /// Links a leaf that a first attempt has room for.
 const FIRST_GUESS: u64 = 64;
 
@@ -94,7 +97,9 @@ pub struct TransferWindow {
     pub first_transfer: u32,
     pub count: u32,
     /// Sender's entry in a table (node x bins + bin), and the bits of the weight.
-    pub transfers: Buffer<UVec2>,
+    pub transfers: Buffer<u64>,
+    /// Cells with transfers, those with the most first.
+    pub work: Buffer<u32>,
 }
 
 /// Receivers of a window and its place among all transfers.
@@ -110,7 +115,8 @@ pub struct Transfers {
 
 impl Transfers {
     pub fn size_bytes(&self) -> u64 {
-        self.cell_offsets.size_bytes() + self.windows.iter().map(|w| w.transfers.size_bytes()).sum::<u64>()
+        self.cell_offsets.size_bytes()
+            + self.windows.iter().map(|w| w.transfers.size_bytes() + w.work.size_bytes()).sum::<u64>()
     }
 
     /// Form factors of `links` where their nodes are now: count, prefix sum, fill, sort.       [Dachsbacher2007 3.1]
@@ -151,19 +157,20 @@ impl Transfers {
         let total = context.download_range(&cell_offsets, cells..cells + 1)?[0];
 
         let mut result = Self { cell_offsets, windows: Vec::new(), count: total };
-        let needed = u64::from(total) * size_of::<UVec2>() as u64;
+        let needed = u64::from(total) * size_of::<u64>() as u64;
         let available = budget.min(context.available_bytes());
         if needed > available {
             return Err(LinkingError::OutOfMemory { what: "transfers", needed, available });
         }
         for (nodes, transfers) in result.plan_windows(context, hierarchy.node_count(), bin_count)? {
             let name = format!("antiradiance/transfers {}", result.windows.len());
-            let window = TransferWindow {
+            let mut window = TransferWindow {
                 first_node: nodes.start,
                 node_count: nodes.len() as u32,
                 first_transfer: transfers.start,
                 count: transfers.len() as u32,
                 transfers: context.buffer(&name, transfers.len())?,
+                work: context.buffer("antiradiance/no work", 0)?,
             };
             let fill = passes::FillTransfers {
                 links: &links.pairs,
@@ -196,9 +203,42 @@ impl Transfers {
             };
             recorder.dispatch(&sort, nodes.len() * bin_count as usize);
             recorder.submit()?;
+            window.work = result.list_work(context, nodes.start * bin_count, nodes.len() as u32 * bin_count)?;
             result.windows.push(window);
         }
         Ok(result)
+    }
+
+    /// The cells with transfers, the longest first: threads side by side then have as much to do.
+    fn list_work(&self, context: &Context, first_cell: u32, cell_count: u32) -> Result<Buffer<u32>, GpuError> {
+        let class_counts = context.upload("antiradiance/work classes", &[0u32; WORK_CLASSES])?;
+        let threads = cell_count.div_ceil(WORK_CELLS) * passes::CountWork::PROGRAM.workgroup[0];
+        let mut recorder = context.recorder("links")?;
+        let count = passes::CountWork {
+            cell_offsets: &self.cell_offsets,
+            class_counts: &class_counts,
+            params: passes::CountWorkParams { first_cell, cell_count },
+        };
+        recorder.dispatch(&count, threads);
+        recorder.submit()?;
+        let counts = context.download(&class_counts)?;
+        let (mut total, mut starts) = (0, Vec::with_capacity(WORK_CLASSES));
+        for count in counts {
+            starts.push(total);
+            total += count;
+        }
+        context.write(&class_counts, &starts)?;
+        let work = context.buffer("antiradiance/work", total as usize)?;
+        let mut recorder = context.recorder("links")?;
+        let list = passes::ListWork {
+            cell_offsets: &self.cell_offsets,
+            class_counts: &class_counts,
+            work: &work,
+            params: passes::ListWorkParams { first_cell, cell_count },
+        };
+        recorder.dispatch(&list, threads);
+        recorder.submit()?;
+        Ok(work)
     }
 
     /// Ranges of (receivers, transfers), none larger than a pass can bind.
@@ -208,7 +248,7 @@ impl Transfers {
         node_count: u32,
         bin_count: u32,
     ) -> Result<Vec<NodesAndTransfers>, LinkingError> {
-        let largest = context.limits().storage_buffer_bytes / size_of::<UVec2>() as u64;
+        let largest = context.limits().storage_buffer_bytes / size_of::<u64>() as u64;
         if u64::from(self.count) <= largest {
             return Ok(vec![(0..node_count, 0..self.count)]);
         }
@@ -231,29 +271,20 @@ impl Transfers {
     }
 
     /// `incident` from `exitant` along all transfers.                       [Dachsbacher2007 4.2, global pass]
-    pub fn gather(
-        &self,
-        recorder: &mut Recorder<'_>,
-        bin_count: u32,
-        half: bool,
-        exitant: &Buffer<u32>,
-        incident: &Buffer<u32>,
-    ) {
+    pub fn gather(&self, recorder: &mut Recorder<'_>, half: bool, exitant: &Buffer<u64>, incident: &Buffer<u64>) {
+        recorder.fill(incident, 0);
         for window in &self.windows {
-            let cell_count = window.node_count * bin_count;
+            let work_count = window.work.len() as u32;
             let pass = passes::Gather {
                 cell_offsets: &self.cell_offsets,
                 transfers: &window.transfers,
+                work: &window.work,
                 exitant,
                 incident,
                 constants: passes::GatherConstants { words: Tables::words(half) as u32 },
-                params: passes::GatherParams {
-                    first_cell: window.first_node * bin_count,
-                    cell_count,
-                    first_transfer: window.first_transfer,
-                },
+                params: passes::GatherParams { work_count, first_transfer: window.first_transfer },
             };
-            recorder.dispatch(&pass, cell_count);
+            recorder.dispatch(&pass, work_count);
         }
     }
 
@@ -269,7 +300,7 @@ impl Transfers {
         for (cell, &end) in ends.iter().take(ends.len() - 1).enumerate() {
             all.extend((first..end).map(|k| {
                 let word = words[k as usize];
-                (cell as u32, word.x, f32::from_bits(word.y))
+                (cell as u32, word as u32, f32::from_bits((word >> 32) as u32))
             }));
             first = end;
         }

@@ -12,15 +12,15 @@ use glam::{Vec2, Vec3};
 /// Threads of a leaf in `local.comp`.
 const LOCAL_LANES: u32 = 8;
 
-/// Light by node and direction, and by leaf and side. Entry of a table: `node * bins + bin`, [`Tables::words`] words.
+/// Light by node and direction, and by leaf and side. Entry of a table: `node * bins + bin`, [`Tables::words`] words of 64 bits.
 pub struct Tables {
     pub bin_count: u32,
-    /// Entries are three f16 in two words, else three f32.
+    /// Entries are three f16, else three f32.
     pub half: bool,
     /// Intensity per area, radiance times cosine: reflected and emitted light less antiradiance, W m^-2 sr^-1.
-    pub exitant: Buffer<u32>,
-    /// Radiance, W m^-2 sr^-1.
-    pub incident: Buffer<u32>,
+    pub exitant: Buffer<u64>,
+    /// Radiance, W m^-2 sr^-1. A leaf lacks what stands with its parent.
+    pub incident: Buffer<u64>,
     /// Per bin: radiance of the environment that travels along it.
     pub environment: Buffer<Vec3>,
     pub is_environment_black: bool,
@@ -49,12 +49,12 @@ pub struct LocalStep {
 impl Tables {
     /// Words of an entry.
     pub fn words(half: bool) -> u64 {
-        if half { 2 } else { 3 }
+        if half { 1 } else { 2 }
     }
 
     /// Bytes of one of the two large tables.
     pub fn table_bytes(node_count: u32, bin_count: u32, half: bool) -> u64 {
-        u64::from(node_count) * u64::from(bin_count) * 4 * Self::words(half)
+        u64::from(node_count) * u64::from(bin_count) * 8 * Self::words(half)
     }
 
     pub fn new(
@@ -65,7 +65,7 @@ impl Tables {
         half: bool,
     ) -> Result<Self, GpuError> {
         let bin_count = bins.bins.count();
-        let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 4) as usize;
+        let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
         let (leaves, sides) = (hierarchy.leaf_count() as usize, 2 * hierarchy.leaf_count() as usize);
         Ok(Self {
             bin_count,
@@ -120,7 +120,7 @@ impl Tables {
         step: LocalStep,
     ) {
         recorder.scope("global", |recorder| {
-            transfers.gather(recorder, self.bin_count, self.half, &self.exitant, &self.incident);
+            transfers.gather(recorder, self.half, &self.exitant, &self.incident);
         });
         recorder.scope("push", |recorder| self.push(recorder, hierarchy));
         self.local(recorder, hierarchy, bins, elements, step);
@@ -140,8 +140,8 @@ impl Tables {
                 level_nodes: &hierarchy.levels.nodes,
                 nodes: &hierarchy.nodes,
                 incident: &self.incident,
-                constants: passes::PushConstants { words: Self::words(self.half) as u32 },
-                params: passes::PushParams { first: level.start, count: level.len() as u32, bin_count: self.bin_count },
+                constants: passes::PushConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
+                params: passes::PushParams { first: level.start, count: level.len() as u32 },
             };
             recorder.dispatch(&pass, level.len() * self.bin_count as usize);
         });
@@ -158,6 +158,7 @@ impl Tables {
         let leaf_count = hierarchy.leaf_count();
         let pass = passes::Local {
             leaves: &hierarchy.leaves,
+            nodes: &hierarchy.nodes,
             cosine_norms: &self.cosine_norms,
             bin_directions: &bins.directions,
             incident: &self.incident,
@@ -168,10 +169,9 @@ impl Tables {
             exitant: &self.exitant,
             irradiance: &self.irradiance,
             residuals: &self.residuals,
-            constants: passes::LocalConstants { words: Self::words(self.half) as u32 },
+            constants: passes::LocalConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
             params: passes::LocalParams {
                 leaf_count,
-                bin_count: self.bin_count,
                 update_radiosity: u32::from(step.reflects),
                 add_environment: u32::from(step.has_environment),
             },
@@ -183,12 +183,11 @@ impl Tables {
                     level_nodes: &hierarchy.levels.nodes,
                     nodes: &hierarchy.nodes,
                     exitant: &self.exitant,
-                    constants: passes::PullConstants { words: Self::words(self.half) as u32 },
-                    params: passes::PullParams {
-                        first: level.start,
-                        count: level.len() as u32,
+                    constants: passes::PullConstants {
+                        words: Self::words(self.half) as u32,
                         bin_count: self.bin_count,
                     },
+                    params: passes::PullParams { first: level.start, count: level.len() as u32 },
                 };
                 recorder.dispatch(&pass, level.len() * self.bin_count as usize);
             });
