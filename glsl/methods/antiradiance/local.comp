@@ -12,7 +12,9 @@
 // updates radiosity[2 leaf_count] (W/m2), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
 // writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
 // shared 64 x (irradiance of both sides, residuals)
-// Differs from [Dachsbacher2007]: one leaf is both sides of a surface; open surfaces take away light from behind as well.
+// Differs from [Dachsbacher2007]: less than nothing never arrives. While antiradiance settles, each step takes away too
+// much, then too little; with a floor under it the even steps rise and the odd ones fall towards the solution, where
+// without it their difference first grows by the number of surfaces one behind the other (books on a shelf). One leaf is both sides of a surface; open surfaces take away light from behind as well.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
@@ -31,6 +33,7 @@ layout(set = 0, binding = 11, scalar) readonly buffer Nodes { HierarchyNode node
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
+    uint is_positive;           // 1: no less than nothing arrives
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
 
@@ -46,7 +49,8 @@ vec3 incident_in(uint row, uint parent_row, uint bin)
 {
     vec3 arriving = LOAD_ENTRY(incident, row + bin);
     if (parent_row != NONE) arriving += LOAD_ENTRY(incident, parent_row + bin);
-    return params.add_environment != 0 ? arriving + environment[bin] : arriving;
+    if (params.add_environment != 0) arriving += environment[bin];
+    return params.is_positive != 0 ? max(arriving, vec3(0.0)) : arriving;
 }
 
 void main()

@@ -25,7 +25,8 @@
 //!
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
 //! and bins at leaves are those of the actual direction; a sender larger than a bin is read in every bin that it covers
-//! (selectable); open surfaces block light that meets their backs; near senders are discs, never more than half of the
+//! (selectable); open surfaces block light that meets their backs; incident
+//! radiance is held at or above zero (selectable); near senders are discs, never more than half of the
 //! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! What it does not do: transparent surfaces, and refinement by the light that is sent.
 //!
@@ -83,7 +84,7 @@ crate::settings! {
     /// What antiradiance lets the user choose.
     pub struct Settings {
         /// Direction bins over the sphere: 8 k^2.
-        bins: BinCount = BinCount::of_octant_side(4), paper "128 (128 to 1024)";
+        bins: BinCount = BinCount::of_octant_side(5), paper "128 (128 to 1024)";
         /// The order of the steps.
         scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
         /// Steps of the symmetric scheme.
@@ -95,11 +96,14 @@ crate::settings! {
         /// How a sender larger than a bin spreads over the receiver's bins.
         spread: Spread = Spread::Cone, paper "gaussian";
         /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
-        refinement: f32 = 1.0, range 0.01..=100.0, unit "bins", paper "1";
+        refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
+        /// Hold incident radiance at or above zero in every bin, so that no step takes away more than there is: the
+        /// iteration then settles however many surfaces stand one behind the other.
+        positive: bool = true, paper "off";
         /// Which surfaces take away light that meets their backs.
         backs: Backs = Backs::Open, paper "none: solids only";
-        /// Keep the tables in f16: two thirds of the memory.
-        half_tables: bool = false, paper "on";
+        /// Keep the tables in f16: half of the memory, entries off by 1/2048 at most.
+        half_tables: bool = true, paper "on";
         /// How far animated parts may move before links are made anew; form factors follow in between.
         motion_margin: f32 = 0.0, range 0.0..=1e6, unit "m", paper "bounds stated per object";
         /// Average indirect light over the one-ring.
@@ -202,7 +206,8 @@ impl Antiradiance {
         let budget = check_memory(context, &plan, &settings, budget)?;
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
-        let tables = Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables)?;
+        let tables =
+            Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables, settings.positive)?;
         let mut recorder = context.recorder("antiradiance")?;
         tables.update_norms(&mut recorder, &hierarchy, &bins);
         recorder.submit()?;

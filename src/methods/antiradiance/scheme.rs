@@ -7,7 +7,7 @@ use crate::stages::work::Watch;
 use serde::Serialize;
 
 /// Change of the exitant light, of the most there was, beyond which an iteration is said to grow.
-const GROWTH_LIMIT: f64 = 1e3;
+const GROWTH_LIMIT: f64 = 100.0;
 /// Steps over which a growth rate is estimated.
 const GROWTH_STEPS: usize = 4;
 
@@ -129,6 +129,12 @@ impl Antiradiance {
         });
         recorder.submit()?;
         let residual = self.measure(context, bounce, step.reflects)?;
+        tracing::debug!(
+            "step {}, bounce {bounce}: exitant light {:.4} W, changed by {:.4} W",
+            residual.step,
+            residual.total,
+            residual.change
+        );
         self.residuals.push(residual);
         self.watch()?;
         Ok(residual)

@@ -21,6 +21,8 @@ pub struct Tables {
     pub exitant: Buffer<u64>,
     /// Radiance, W m^-2 sr^-1. A leaf lacks what stands with its parent.
     pub incident: Buffer<u64>,
+    /// Incident radiance is never below zero.
+    pub positive: bool,
     /// Per bin: radiance of the environment that travels along it.
     pub environment: Buffer<Vec3>,
     pub is_environment_black: bool,
@@ -63,6 +65,7 @@ impl Tables {
         bins: &DeviceBins,
         environment: &Environment,
         half: bool,
+        positive: bool,
     ) -> Result<Self, GpuError> {
         let bin_count = bins.bins.count();
         let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
@@ -70,6 +73,7 @@ impl Tables {
         Ok(Self {
             bin_count,
             half,
+            positive,
             exitant: context.buffer("antiradiance/exitant", words)?,
             incident: context.buffer("antiradiance/incident", words)?,
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
@@ -173,6 +177,7 @@ impl Tables {
             params: passes::LocalParams {
                 leaf_count,
                 update_radiosity: u32::from(step.reflects),
+                is_positive: u32::from(self.positive),
                 add_environment: u32::from(step.has_environment),
             },
         };
