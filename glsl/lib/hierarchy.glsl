@@ -9,6 +9,7 @@ struct HierarchyNode {
     uint skip;          // first node after the subtree
     uint parent;        // NONE for the root
     uint leaf;          // index of the leaf, NONE for an inner node
+    uint shape;         // a leaf whose normal and flags are those of all below: its own, one of a flat surface's, else NONE
     uint surface;       // the flat surface that all below lies in, else NONE
     float margin;       // how far anything below may move from its place at rest, metres
 };

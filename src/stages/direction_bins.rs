@@ -3,7 +3,7 @@
 //! `m = 8 k^2` bins: each octant of the sphere is a square of k x k cells, by the equal-area map of [Shirley1997] over
 //! each half of the sphere. The set is closed under reversal. A class of senders is a list for each bin: the bins
 //! around it, nearest first, with weights. Class 0 has the nearest bins, for a sender within one bin; class c >= 1 is
-//! for senders of about `2^c` bins.
+//! for senders of up to `2^(c/2)` bins.
 //!
 //! [Shirley1997]: crate::methods::PAPERS
 
@@ -86,7 +86,7 @@ impl DirectionBins {
 
     /// Classes beside class 0: the last is for senders of half the sphere.
     pub fn class_count(&self) -> u32 {
-        (self.count() / 2).ilog2()
+        (2.0 * (0.5 * self.count() as f32).log2()).ceil() as u32
     }
 
     /// The lists of class `0..=class_count()`, each bin's in turn, and where each starts.
@@ -124,7 +124,7 @@ impl DirectionBins {
     fn weight(&self, spread: Spread, class: u32, angle: f32) -> f32 {
         let cone = |solid_angle: f32| (1.0 - solid_angle / (2.0 * PI)).max(-1.0).acos();
         let bin_radius = cone(self.solid_angle());
-        let radius = cone((self.solid_angle() * (1 << class) as f32).min(2.0 * PI));
+        let radius = cone((self.solid_angle() * (0.5 * class as f32).exp2()).min(2.0 * PI));
         match (class, spread) {
             (0, _) | (_, Spread::None) => 1.0,
             // The standard deviation is a bin's width, the radius that of the sender.           [Dachsbacher2007 3.1]
@@ -224,8 +224,8 @@ mod tests {
                     if spread == Spread::Cone {
                         // Covers as many bins as the class is for, roughly.
                         let covered: f32 = list.iter().map(|entry| entry.weight).sum();
-                        let ratio = covered / (1 << class) as f32;
-                        assert!((0.6..1.7).contains(&ratio), "class {class}, bin {bin}: {covered}");
+                        let ratio = covered / (0.5 * class as f32).exp2();
+                        assert!((0.6..1.8).contains(&ratio), "class {class}, bin {bin}: {covered}");
                     }
                 }
             }

@@ -89,6 +89,7 @@ impl HierarchyPlan {
             }
             let node = plan.nodes.last_mut().expect("a leaf is added to its node");
             node.leaf = plan.leaves.len() as u32;
+            node.shape = node.leaf;
             node.surface = if surfaces.is_flat[surface as usize] { surface } else { NONE };
             node.margin = margin(vertex);
             plan.leaf_of_element[vertex as usize] = node.leaf;
@@ -122,7 +123,9 @@ impl HierarchyPlan {
             let first = self.nodes[children[0] as usize].surface;
             let same = children.iter().all(|&child| self.nodes[child as usize].surface == first);
             let margin = children.iter().map(|&child| self.nodes[child as usize].margin).fold(0.0, f32::max);
+            let shape = self.nodes[children[0] as usize].shape;
             let inner = &mut self.nodes[node as usize];
+            inner.shape = if same && first != NONE { shape } else { NONE };
             inner.surface = if same { first } else { NONE };
             inner.margin = margin;
         }
@@ -160,6 +163,7 @@ impl Maker<'_> {
             skip: node + 1,
             parent,
             leaf: NONE,
+            shape: NONE,
             surface: NONE,
             margin: 0.0,
         });

@@ -9,12 +9,12 @@
 // reads leaves, nodes, cosine_norms, bin_directions, incident[node_count * BIN_COUNT] (pushed down to
 //       the parents of leaves), environment[BIN_COUNT] (W m^-2 sr^-1),
 //       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count]
-// updates radiosity[2 leaf_count] (W/m2), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
+// updates radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1: the most there was), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
 // writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
 // shared 64 x (irradiance of both sides, residuals)
-// Differs from [Dachsbacher2007]: less than nothing never arrives. While antiradiance settles, each step takes away too
-// much, then too little; with a floor under it the even steps rise and the odd ones fall towards the solution, where
-// without it their difference first grows by the number of surfaces one behind the other (books on a shelf). One leaf is both sides of a surface; open surfaces take away light from behind as well.
+// Differs from [Dachsbacher2007]: what arrives in a bin may not fall far below zero. While antiradiance settles, each step
+// takes away too much, then too little; without a floor the difference first grows with the number of surfaces one behind
+// the other (books on a shelf: a thousandfold). One leaf is both sides of a surface; open surfaces take away light from behind as well.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
@@ -30,10 +30,12 @@ layout(set = 0, binding = 8, scalar) buffer Exitant { uint64_t exitant[]; };
 layout(set = 0, binding = 9, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 10, scalar) writeonly buffer Residuals { vec2 residuals[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
+layout(set = 0, binding = 12, scalar) buffer Means { vec3 means[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
-    uint is_positive;           // 1: no less than nothing arrives
+    uint sets_floor;            // 1: what arrives now may lower the floor
+    float undershoot;           // of the floor
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
 
@@ -50,7 +52,7 @@ vec3 incident_in(uint row, uint parent_row, uint bin)
     vec3 arriving = LOAD_ENTRY(incident, row + bin);
     if (parent_row != NONE) arriving += LOAD_ENTRY(incident, parent_row + bin);
     if (params.add_environment != 0) arriving += environment[bin];
-    return params.is_positive != 0 ? max(arriving, vec3(0.0)) : arriving;
+    return arriving;
 }
 
 void main()
@@ -65,11 +67,15 @@ void main()
     bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0, reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
     float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
 
+    vec3 floor_front = -params.undershoot * means[2 * leaf], floor_back = -params.undershoot * means[2 * leaf + 1];
+
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
     for (uint bin = lane; bin < BIN_COUNT; bin += LANES) {
         float cosine = dot(own.normal, bin_directions[bin]);
-        vec3 arriving = discrete_cosine(cosine, norm, BIN_COUNT) * bin_solid_angle * incident_in(row, parent_row, bin);
+        vec3 arriving = incident_in(row, parent_row, bin);
+        if (params.sets_floor == 0) arriving = max(arriving, cosine <= 0.0 ? floor_front : floor_back);
+        arriving *= discrete_cosine(cosine, norm, BIN_COUNT) * bin_solid_angle;
         if (cosine <= 0.0) front += arriving;
         else back += arriving;
     }
@@ -80,8 +86,14 @@ void main()
     back = vec3(0.0);
     for (uint k = 0; k < LANES; ++k) {
         front += sh_front[first_lane + k];
-        if (reflects_behind) back += sh_back[first_lane + k];
+        back += sh_back[first_lane + k];
     }
+    vec3 mean_front = max(means[2 * leaf], front / PI), mean_back = max(means[2 * leaf + 1], back / PI);
+    if (params.sets_floor != 0) {
+        floor_front = -params.undershoot * mean_front;
+        floor_back = -params.undershoot * mean_back;
+    }
+    if (!reflects_behind) back = vec3(0.0);
 
     vec3 b_front = radiosity[2 * leaf], b_back = radiosity[2 * leaf + 1];
     if (params.update_radiosity != 0) {
@@ -94,7 +106,7 @@ void main()
         float cosine = dot(own.normal, bin_directions[bin]);
         bool leaves_front = cosine > 0.0;
         vec3 radiance = (leaves_front ? b_front : b_back) / PI;
-        if (!leaves_front || blocks_behind) radiance -= incident_in(row, parent_row, bin);
+        if (!leaves_front || blocks_behind) radiance -= max(incident_in(row, parent_row, bin), leaves_front ? floor_back : floor_front);
         vec3 intensity = discrete_cosine(cosine, norm, BIN_COUNT) * radiance;
         vec3 change = abs(intensity - LOAD_ENTRY(exitant, row + bin));
         residual += vec2(change.r + change.g + change.b, abs(intensity.r) + abs(intensity.g) + abs(intensity.b));
@@ -105,6 +117,10 @@ void main()
     if (lane != 0 || !is_own) return;
     residual = vec2(0.0);
     for (uint k = 0; k < LANES; ++k) residual += sh_residual[first_lane + k];
+    if (params.sets_floor != 0) {
+        means[2 * leaf] = mean_front;
+        means[2 * leaf + 1] = mean_back;
+    }
     irradiance[2 * leaf] = front;
     irradiance[2 * leaf + 1] = back;
     radiosity[2 * leaf] = b_front;

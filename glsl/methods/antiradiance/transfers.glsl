@@ -6,7 +6,7 @@
 //     void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight)
 // The weight turns the sender's exitant intensity per area into the receiver's incident radiance: it is the share of the
 // bin that the sender covers.                                                        [Dachsbacher2007 Eqs. 15 to 17]
-// Differs from [Dachsbacher2007]: at leaves the cosines of the actual direction stand in for those of the bin, bins lie on
+// Differs from [Dachsbacher2007]: at leaves, and nodes within a flat surface, the cosines of the actual direction stand in for those of the bin, bins lie on
 // the side of the surface that the direction lies on, and a sender larger than a bin is read in each bin that it covers,
 // not in one (its own "accurate CPU implementation"). Nothing then passes from one bin into another, so that what a
 // surface lets through and takes away cancel bin by bin, and no chain of near surfaces can grow.
@@ -25,20 +25,21 @@ void transfers_of(uint sender, uint receiver)
     if (!(squared > 0.0) || q.area <= 0.0) return;
     vec3 w = offset / sqrt(squared);
 
-    bool p_is_leaf = p.leaf != NONE, q_is_leaf = q.leaf != NONE;
+    // Nodes within one flat surface have a normal like a leaf.
+    bool p_is_flat = p.shape != NONE, q_is_flat = q.shape != NONE;
     vec3 p_normal = vec3(0.0), q_normal = vec3(0.0);
     float p_cos = 0.0, q_cos = 0.0, p_norm = 0.0, q_norm = 0.0;
     bool passes_behind = false;
-    if (p_is_leaf) {
-        p_normal = leaves[p.leaf].normal;
-        p_norm = cosine_norms[p.leaf];
+    if (p_is_flat) {
+        p_normal = leaves[p.shape].normal;
+        p_norm = cosine_norms[p.shape];
         p_cos = dot(p_normal, w);
-        passes_behind = (leaves[p.leaf].flags & BLOCKS_BEHIND) == 0;
+        passes_behind = (leaves[p.shape].flags & BLOCKS_BEHIND) == 0;
     }
     float bin_solid_angle = FOUR_PI / float(params.bins.count), solid_angle = q.area / squared;
-    if (q_is_leaf) {
-        q_normal = leaves[q.leaf].normal;
-        q_norm = cosine_norms[q.leaf];
+    if (q_is_flat) {
+        q_normal = leaves[q.shape].normal;
+        q_norm = cosine_norms[q.shape];
         q_cos = dot(q_normal, w);
         // Of a disc of the projected area, seen from straight above: never more than half of the sphere.
         float ratio = q.area * abs(q_cos) / (0.5 * FOUR_PI * 0.5 * squared);
@@ -48,19 +49,21 @@ void transfers_of(uint sender, uint receiver)
     float coverage = solid_angle / bin_solid_angle;
 
     uint middle = bin_of(w, params.bins.side);
-    uint size_class = uint(clamp(round(log2(coverage)), 0.0, float(params.bins.class_count)));
-    if (!q_is_leaf || size_class == 0) {
+    // The class above, so that no bin is covered more than once and nothing is cut off.
+    float doublings = log2(coverage);
+    uint size_class = doublings < 0.25 ? 0u : min(uint(ceil(2.0 * doublings)), params.bins.class_count);
+    if (!q_is_flat || size_class == 0) {
         if (passes_behind && p_cos >= 0.0) return;
         uint first = spread_offsets[middle], last = spread_offsets[middle + 1];
         for (uint k = first; k < last; ++k) {
             uint bin = spread[k].bin;
             vec3 v = bin_directions[bin];
             float p_bin = dot(p_normal, v), q_bin = dot(q_normal, v);
-            if (p_is_leaf && p_bin * p_cos <= 0.0) continue;
-            if (q_is_leaf && q_bin * q_cos <= 0.0) continue;
+            if (p_is_flat && p_bin * p_cos <= 0.0) continue;
+            if (q_is_flat && q_bin * q_cos <= 0.0) continue;
             float weight = coverage;
-            if (p_is_leaf) weight *= abs(p_cos) / discrete_cosine(p_bin, p_norm, params.bins.count);
-            if (q_is_leaf) weight /= discrete_cosine(q_bin, q_norm, params.bins.count);
+            if (p_is_flat) weight *= abs(p_cos) / discrete_cosine(p_bin, p_norm, params.bins.count);
+            if (q_is_flat) weight /= discrete_cosine(q_bin, q_norm, params.bins.count);
             transfer(receiver, bin, sender, bin, weight);
             return;
         }

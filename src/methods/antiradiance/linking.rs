@@ -53,17 +53,16 @@ impl NodeLinks {
         solid_angle: f32,
         budget: u64,
     ) -> Result<Self, LinkingError> {
-        let plan = PairQueuePlan {
-            batch: QUEUE_BATCH,
-            // A node of four children with itself: six pairs and four selves.
-            max_children: 10,
-            levels: 2 * hierarchy.plan.depth() + 1,
-            seeds: 1,
-        };
+        // A node of four children with itself: six pairs and four selves.
+        let mut plan =
+            PairQueuePlan { batch: QUEUE_BATCH, max_children: 10, levels: 2 * hierarchy.plan.depth() + 1, seeds: 1 };
+        while plan.bytes_needed() > context.limits().storage_buffer_bytes && plan.batch > 1 {
+            plan.batch /= 2;
+        }
         let queue = PairQueue::new(context, "antiradiance", plan)?;
         let link_bytes = size_of::<UVec2>() as u64;
         let available = budget.min(context.limits().storage_buffer_bytes);
-        let mut capacity = (FIRST_GUESS * u64::from(hierarchy.leaf_count())).clamp(1024, available / link_bytes);
+        let mut capacity = (FIRST_GUESS * u64::from(hierarchy.leaf_count())).max(1024).min(available / link_bytes);
         let seeds: &[UVec2] = if hierarchy.node_count() > 0 { &[UVec2::ZERO] } else { &[] };
         loop {
             let pairs = context.buffer("antiradiance/links", capacity as usize)?;

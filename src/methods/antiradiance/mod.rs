@@ -26,7 +26,7 @@
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
 //! and bins at leaves are those of the actual direction; a sender larger than a bin is read in every bin that it covers
 //! (selectable); open surfaces block light that meets their backs; incident
-//! radiance is held at or above zero (selectable); near senders are discs, never more than half of the
+//! radiance may not fall far below zero (selectable); near senders are discs, never more than half of the
 //! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! What it does not do: transparent surfaces, and refinement by the light that is sent.
 //!
@@ -97,9 +97,10 @@ crate::settings! {
         spread: Spread = Spread::Cone, paper "gaussian";
         /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
         refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
-        /// Hold incident radiance at or above zero in every bin, so that no step takes away more than there is: the
-        /// iteration then settles however many surfaces stand one behind the other.
-        positive: bool = true, paper "off";
+        /// How far below zero the light of a bin may fall, of the mean light its side received unoccluded: keeps the
+        /// iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
+        /// never cuts.
+        undershoot: f32 = 0.5, range 0.0..=1e9, paper "no limit";
         /// Which surfaces take away light that meets their backs.
         backs: Backs = Backs::Open, paper "none: solids only";
         /// Keep the tables in f16: half of the memory, entries off by 1/2048 at most.
@@ -135,7 +136,7 @@ pub enum AntiradianceError {
     OutOfMemory { what: &'static str, nodes: u64, bins: u32, half: bool, needed: u64, available: u64 },
     #[error(
         "antiradiance grows: after {steps} steps of the {scheme} scheme changes are multiplied by about {rate:.2} each \
-         step (spectral radius above 1); use scheme=asymmetric, spread=cone, or fewer bins"
+         step (spectral radius above 1); lower undershoot, or set scheme=asymmetric, spread=cone, or fewer bins"
     )]
     Growth { steps: u32, rate: f64, scheme: &'static str },
 }
@@ -170,7 +171,7 @@ struct State {
     is_free: Buffer<u32>,
 }
 
-/// Shadow rays of a batch.
+/// Shadow rays of a batch, where a buffer may be that large.
 const SHADOW_RAYS: usize = 1 << 19;
 
 impl Antiradiance {
@@ -207,7 +208,7 @@ impl Antiradiance {
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
         let tables =
-            Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables, settings.positive)?;
+            Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables, settings.undershoot)?;
         let mut recorder = context.recorder("antiradiance")?;
         tables.update_norms(&mut recorder, &hierarchy, &bins);
         recorder.submit()?;
@@ -410,6 +411,7 @@ impl Antiradiance {
 impl State {
     fn new(context: &Context, elements: &Elements, light_count: u32) -> Result<Self, GpuError> {
         let count = elements.count as usize;
+        let shadow_rays = SHADOW_RAYS.min(context.limits().storage_buffer_bytes as usize / size_of::<Ray>());
         Ok(Self {
             irradiance: context.buffer("antiradiance/direct irradiance", count)?,
             punctual: context.buffer("antiradiance/punctual", count)?,
@@ -417,8 +419,8 @@ impl State {
             indirect: context.buffer("antiradiance/indirect", count)?,
             smoothed: context.buffer("antiradiance/smoothed", count)?,
             visibility: context.buffer("antiradiance/visibility", count * light_count as usize)?,
-            rays: context.buffer("antiradiance/shadow rays", SHADOW_RAYS)?,
-            is_free: context.buffer("antiradiance/is free", SHADOW_RAYS)?,
+            rays: context.buffer("antiradiance/shadow rays", shadow_rays)?,
+            is_free: context.buffer("antiradiance/is free", shadow_rays)?,
         })
     }
 }

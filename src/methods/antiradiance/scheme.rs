@@ -7,7 +7,7 @@ use crate::stages::work::Watch;
 use serde::Serialize;
 
 /// Change of the exitant light, of the most there was, beyond which an iteration is said to grow.
-const GROWTH_LIMIT: f64 = 100.0;
+const GROWTH_LIMIT: f64 = 1e3;
 /// Steps over which a growth rate is estimated.
 const GROWTH_STEPS: usize = 4;
 
@@ -82,7 +82,11 @@ impl Antiradiance {
             Scheme::Symmetric => {
                 for iteration in 1..=self.settings.iterations {
                     watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
-                    self.step_once(context, iteration, LocalStep { reflects: true, has_environment: false })?;
+                    self.step_once(
+                        context,
+                        iteration,
+                        LocalStep { reflects: true, has_environment: false, sets_floor: true },
+                    )?;
                 }
             }
             Scheme::Asymmetric => {
@@ -105,8 +109,10 @@ impl Antiradiance {
         has_environment: bool,
         reflects: Option<bool>,
     ) -> Result<(), AntiradianceError> {
-        for _ in 0..self.settings.depth {
-            let residual = self.step_once(context, bounce, LocalStep { reflects: false, has_environment })?;
+        for step in 0..self.settings.depth {
+            let sets_floor = bounce <= 1 && step == 0;
+            let residual =
+                self.step_once(context, bounce, LocalStep { reflects: false, has_environment, sets_floor })?;
             if residual.relative() < f64::from(self.settings.tolerance) {
                 break;
             }

@@ -21,8 +21,8 @@ pub struct Tables {
     pub exitant: Buffer<u64>,
     /// Radiance, W m^-2 sr^-1. A leaf lacks what stands with its parent.
     pub incident: Buffer<u64>,
-    /// Incident radiance is never below zero.
-    pub positive: bool,
+    /// How far below zero the light of a bin may fall, of its side's mean.
+    pub undershoot: f32,
     /// Per bin: radiance of the environment that travels along it.
     pub environment: Buffer<Vec3>,
     pub is_environment_black: bool,
@@ -31,6 +31,8 @@ pub struct Tables {
     /// Two per leaf from here on, front and back, W/m2. Radiosity without transport.
     pub source: Buffer<Vec3>,
     pub radiosity: Buffer<Vec3>,
+    /// The largest mean radiance that arrived in a step that sets the floor, W m^-2 sr^-1.
+    pub means: Buffer<Vec3>,
     /// What arrived last.
     pub irradiance: Buffer<Vec3>,
     /// Direct light of linked emitters and of the environment.
@@ -46,6 +48,8 @@ pub struct LocalStep {
     pub reflects: bool,
     /// The environment shines on every leaf.
     pub has_environment: bool,
+    /// The mean radiance that arrives now counts for how far below zero a bin may fall.
+    pub sets_floor: bool,
 }
 
 impl Tables {
@@ -65,7 +69,7 @@ impl Tables {
         bins: &DeviceBins,
         environment: &Environment,
         half: bool,
-        positive: bool,
+        undershoot: f32,
     ) -> Result<Self, GpuError> {
         let bin_count = bins.bins.count();
         let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
@@ -73,7 +77,7 @@ impl Tables {
         Ok(Self {
             bin_count,
             half,
-            positive,
+            undershoot,
             exitant: context.buffer("antiradiance/exitant", words)?,
             incident: context.buffer("antiradiance/incident", words)?,
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
@@ -81,6 +85,7 @@ impl Tables {
             cosine_norms: context.buffer("antiradiance/cosine norms", leaves)?,
             source: context.buffer("antiradiance/source", sides)?,
             radiosity: context.buffer("antiradiance/radiosity", sides)?,
+            means: context.buffer("antiradiance/means", sides)?,
             irradiance: context.buffer("antiradiance/irradiance", sides)?,
             linked: context.buffer("antiradiance/linked irradiance", sides)?,
             residuals: context.buffer("antiradiance/residuals", leaves)?,
@@ -110,7 +115,14 @@ impl Tables {
     ) {
         recorder.fill(&self.incident, 0);
         recorder.fill(&self.exitant, 0);
-        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: false, has_environment });
+        recorder.fill(&self.means, 0);
+        self.local(
+            recorder,
+            hierarchy,
+            bins,
+            elements,
+            LocalStep { reflects: false, has_environment, sets_floor: true },
+        );
     }
 
     /// One application of U, then K and J: global, push, local, pull.                  [Dachsbacher2007 4.2]
@@ -132,7 +144,13 @@ impl Tables {
 
     /// Reflects what arrived last; antiradiance stays what it is.
     pub fn reflect(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, elements: &Elements) {
-        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: true, has_environment: false });
+        self.local(
+            recorder,
+            hierarchy,
+            bins,
+            elements,
+            LocalStep { reflects: true, has_environment: false, sets_floor: true },
+        );
     }
 
     fn push(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
@@ -171,13 +189,15 @@ impl Tables {
             albedo: &elements.albedo,
             radiosity: &self.radiosity,
             exitant: &self.exitant,
+            means: &self.means,
             irradiance: &self.irradiance,
             residuals: &self.residuals,
             constants: passes::LocalConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
             params: passes::LocalParams {
                 leaf_count,
                 update_radiosity: u32::from(step.reflects),
-                is_positive: u32::from(self.positive),
+                sets_floor: u32::from(step.sets_floor),
+                undershoot: self.undershoot,
                 add_environment: u32::from(step.has_environment),
             },
         };

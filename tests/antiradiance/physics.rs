@@ -1,0 +1,201 @@
+//! Closed forms and conservation laws.
+
+use crate::common::TestContext;
+use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::fixture::{Fixture, builtin_scene};
+use crate::support::{prepare, settings, solve};
+use glam::Vec3;
+use linklight::methods::antiradiance::{AntiradianceError, Scheme, Settings};
+use linklight::scene::environment::{Environment, EnvironmentMap};
+use linklight::scene::pose::Pose;
+use linklight::scene::{LightKind, Material};
+use linklight::stages::emitters::EmitterChoice;
+use linklight::stages::work::Unwatched;
+use std::f32::consts::PI;
+
+fn one_sided(albedo: f32) -> Material {
+    Material { double_sided: false, ..lambert(Vec3::splat(albedo)) }
+}
+
+/// Mean over elements, by area.
+fn mean(values: &[Vec3], area: &[f32]) -> f64 {
+    let total: f64 = area.iter().map(|a| f64::from(*a)).sum();
+    values.iter().zip(area).map(|(e, a)| f64::from(e.x * a)).sum::<f64>() / total
+}
+
+/// A closed room of albedo 1/2 that emits 1 everywhere: each bounce has half of what the one before had.
+#[test]
+fn the_furnace_gains_half_of_each_bounce() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("furnace"), Some(0.6));
+    let mut method = prepare(&context, &fixture, Settings { refinement: 4.0, ..settings(512) });
+    let area = context.download(&method.elements().area).unwrap();
+    let mut before = 0.0;
+    for bounces in 0..=3u32 {
+        let solution = solve(&context, &mut method, &fixture, bounces);
+        let own = mean(&solution.direct, &area) + mean(&solution.indirect, &area);
+        let bounce = own - before;
+        before = own;
+        let expected = f64::from(PI) / 2f64.powi(bounces as i32);
+        println!(
+            "bounce {bounces}: {bounce:.4} W/m2, closed form {expected:.4}, off by {:+.2} %",
+            100.0 * (bounce / expected - 1.0)
+        );
+        assert!((bounce / expected - 1.0).abs() < 0.02, "bounce {bounces}: {bounce} for {expected}");
+        let worst = solution.direct.iter().map(|e| (e.x / PI - 1.0).abs()).fold(0.0, f32::max);
+        assert!(worst < 0.15, "every element's direct light: {worst}");
+    }
+}
+
+/// Without light it is dark, and twice the light is twice the light.
+#[test]
+fn light_is_linear_and_darkness_is_dark() {
+    let context = TestContext::new();
+    let lit = |intensity: f32| {
+        let mut scene = builtin_scene("two-rooms");
+        scene.lights.iter_mut().for_each(|light| light.intensity *= intensity);
+        let emission = if intensity > 0.0 { intensity } else { 0.0 };
+        scene.materials.iter_mut().for_each(|material| material.emission *= emission);
+        let fixture = Fixture::new(&context, scene, Some(1.6));
+        let mut method = prepare(&context, &fixture, settings(72));
+        solve(&context, &mut method, &fixture, 2).indirect
+    };
+    assert!(lit(0.0).iter().all(|e| *e == Vec3::ZERO));
+    let (one, two) = (lit(1.0), lit(2.0));
+    assert!(one.iter().any(|e| e.x > 0.0));
+    for (one, two) in one.iter().zip(&two) {
+        assert!((2.0 * *one - *two).abs().max_element() <= 1e-4 * two.max_element() + 1e-6, "{one} and {two}");
+    }
+}
+
+/// An open plane under an even sky receives pi L, from a sky of a map as well.
+#[test]
+fn an_even_sky_gives_pi_times_its_radiance() {
+    let context = TestContext::new();
+    let radiance = Vec3::new(0.5, 1.0, 2.0);
+    let map = EnvironmentMap { width: 8, height: 4, texels: vec![radiance; 32], rotation: 0.4 };
+    for sky in [Environment::Constant(radiance), Environment::Map(map)] {
+        let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 4, 0);
+        let world = scene(vec![one_sided(0.5)], vec![plane], &[]);
+        let fixture = Fixture::posed(&context, world, None, sky, Pose::rest);
+        let mut method = prepare(&context, &fixture, settings(128));
+        for irradiance in &solve(&context, &mut method, &fixture, 0).direct {
+            assert!((*irradiance / (PI * radiance) - Vec3::ONE).abs().max_element() < 1e-3, "{irradiance}");
+        }
+    }
+}
+
+/// Below a wide lid a floor sees none of the sky, whichever way the lid faces: antiradiance took it away.
+#[test]
+fn a_lid_takes_the_sky_away() {
+    let context = TestContext::new();
+    for (u, v) in [(Vec3::X, Vec3::Z), (Vec3::X, Vec3::NEG_Z)] {
+        let floor = parallelogram(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 6, 0);
+        let corner = -8.0 * (u + v) + Vec3::Y * 0.8;
+        let lid = parallelogram(corner, 16.0 * u, 16.0 * v, 28, 0);
+        let world = scene(vec![one_sided(0.0)], vec![floor, lid], &[]);
+        let fixture = Fixture::posed(&context, world, None, Environment::Constant(Vec3::ONE), Pose::rest);
+        for (undershoot, most) in [(0.0, 0.25), (0.5, 0.12), (1e9, 0.1)] {
+            let mut method = prepare(&context, &fixture, Settings { refinement: 2.0, undershoot, ..settings(128) });
+            let area = context.download(&method.elements().area).unwrap();
+            let direct = solve(&context, &mut method, &fixture, 0).direct;
+            let (floor, sky) = (mean(&direct[..49], &area[..49]), f64::from(PI));
+            println!(
+                "under a lid facing {}, undershoot {undershoot}: {:.4} of the sky is left",
+                u.cross(v),
+                floor / sky
+            );
+            // What is left comes from below the lid's edge (1 %) and through bins that it covers unevenly.
+            assert!(floor / sky < most, "{}", floor / sky);
+        }
+    }
+}
+
+/// Form factors between facing plates, unoccluded.
+#[test]
+fn form_factors_of_plates_are_right() {
+    let context = TestContext::new();
+    for (name, exact) in [("parallel-plates", 0.199_825), ("perpendicular-plates", 0.200_044)] {
+        for bins in [128, 512] {
+            let fixture = Fixture::new(&context, builtin_scene(name), Some(0.1));
+            let settings = Settings { emitters: EmitterChoice::Linked, ..settings(bins) };
+            let mut method = prepare(&context, &fixture, settings);
+            let solution = solve(&context, &mut method, &fixture, 0);
+            let albedo = context.download(&method.elements().albedo).unwrap();
+            let area = context.download(&method.elements().area).unwrap();
+            let lit = |e: usize| albedo[e].x > 0.5;
+            let (mut power, mut total) = (0.0, 0.0);
+            for e in (0..albedo.len()).filter(|&e| lit(e)) {
+                power += f64::from(area[e] * solution.direct[e].x);
+                total += f64::from(area[e]);
+            }
+            let found = power / total;
+            println!("{name}, {bins} bins: form factor {found:.6}, off by {:+.2} %", 100.0 * (found / exact - 1.0));
+            assert!((found / exact - 1.0).abs() < 0.03, "{name}: {found} for {exact}");
+        }
+    }
+}
+
+/// What leaks through walls one polygon thick, and through a closed door.
+#[test]
+fn a_closed_door_leaks_little() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("two-rooms"), Some(0.5));
+    for (bins, undershoot) in [(128, 0.5), (512, 0.5), (128, 1e9), (512, 1e9)] {
+        let mut method = prepare(&context, &fixture, Settings { refinement: 4.0, undershoot, ..settings(bins) });
+        let area = context.download(&method.elements().area).unwrap();
+        let solution = solve(&context, &mut method, &fixture, 4);
+        let (mut dark, mut lit) = ((0.0, 0.0), (0.0, 0.0));
+        for (element, position) in fixture.rest_positions.iter().enumerate() {
+            let room = if position.x > 0.0 { &mut dark } else { &mut lit };
+            room.0 += f64::from(area[element] * solution.indirect[element].element_sum());
+            room.1 += f64::from(area[element]);
+        }
+        let leak = (dark.0 / dark.1) / (lit.0 / lit.1);
+        println!(
+            "two-rooms, {bins} bins, undershoot {undershoot}: the dark room receives {:.3} % of the lit one's light",
+            100.0 * leak
+        );
+        assert!(leak < if undershoot > 1.0 { 0.003 } else { 0.03 }, "{leak}");
+    }
+}
+
+/// Surfaces that reflect three times what they receive have no solution: the growth is told, with its rate.
+#[test]
+fn light_that_grows_is_refused() {
+    let context = TestContext::new();
+    let mut world = builtin_scene("furnace");
+    world.materials.iter_mut().for_each(|m| m.base_color = glam::Vec4::new(3.0, 3.0, 3.0, 1.0));
+    let fixture = Fixture::new(&context, world, Some(1.0));
+    let settings = Settings { scheme: Scheme::Symmetric, iterations: 40, ..settings(128) };
+    let mut method = prepare(&context, &fixture, settings);
+    match method.solve(&context, &fixture.world, 4, &Unwatched) {
+        Err(error @ AntiradianceError::Growth { rate, .. }) => {
+            assert!((2.0..4.0).contains(&rate), "{rate}");
+            assert!(error.to_string().contains("scheme=asymmetric"), "{error}");
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A point light over a floor with a wall: indirect light falls on the floor's lit side of the wall alone.
+#[test]
+fn a_thin_wall_shades_reflected_light() {
+    let context = TestContext::new();
+    let floor = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 16, 0);
+    let wall = parallelogram(Vec3::new(0.0, 0.0, 2.0), Vec3::NEG_Z * 4.0, Vec3::Y * 2.0, 12, 0);
+    let side = parallelogram(Vec3::new(-2.0, 0.0, -2.0), Vec3::Y * 2.0, Vec3::Z * 4.0, 12, 0);
+    let lamp = (light(LightKind::Point, 5.0), Vec3::new(-1.2, 1.5, 0.0), Vec3::NEG_Y);
+    let world = scene(vec![lambert(Vec3::splat(0.8))], vec![floor, wall, side], &[lamp]);
+    let fixture = Fixture::new(&context, world, None);
+    let mut method = prepare(&context, &fixture, settings(200));
+    let indirect = solve(&context, &mut method, &fixture, 2).indirect;
+    let on_floor = |range: std::ops::Range<f32>| {
+        let near = (0..17 * 17).filter(|&e| range.contains(&fixture.rest_positions[e].x));
+        let light: Vec<f32> = near.map(|e| indirect[e].x).collect();
+        light.iter().sum::<f32>() / light.len() as f32
+    };
+    let (lit, shaded) = (on_floor(-1.6..-0.4), on_floor(0.4..1.6));
+    println!("beside a thin wall {lit:.4} W/m2, behind it {shaded:.5}: {:.2} % leak", 100.0 * shaded / lit);
+    assert!(lit > 0.0 && shaded < 0.05 * lit, "{shaded} behind, {lit} before");
+}
