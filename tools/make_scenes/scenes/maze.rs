@@ -11,16 +11,17 @@ const HALF_WIDTH: f32 = 5.0;
 const HALF_LENGTH: f32 = 6.0;
 const HEIGHT: f32 = 4.0;
 
-/// Partitions as centre lines from (x, z) to (x, z) along one axis, with height.
+/// Partitions as centre lines from (x, z) to (x, z) along one axis, with height; half their thickness stands out at
+/// either end. Those at a wall end on its surface: beyond it the sun shines.
 struct Partition([f32; 2], [f32; 2], f32);
 
 const WHITE: [Partition; 8] = [
     Partition([-3.5, -4.0], [3.5, -4.0], 2.25),
     Partition([-3.25, -2.25], [-0.75, -2.25], 1.6),
     Partition([0.75, -2.25], [3.25, -2.25], 1.6),
-    Partition([-5.0, 0.25], [-3.25, 0.25], 1.4),
+    Partition([-4.90625, 0.25], [-3.25, 0.25], 1.4),
     Partition([-1.75, -0.75], [1.25, -0.75], 1.4),
-    Partition([3.25, 0.5], [5.0, 0.5], 1.4),
+    Partition([3.25, 0.5], [4.90625, 0.5], 1.4),
     Partition([-0.25, 0.75], [-0.25, 2.9], 1.15),
     Partition([-3.25, 3.0], [-0.16, 3.0], 1.2),
 ];
