@@ -126,7 +126,7 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
         (&["diff", "a.png", "b.png", "--fail-above", "rmse=-1"], "not a number of at least 0"),
         (&["diff", "a.png", "b.png", "-o", "map.exr"], "must end in .png"),
         (&["diff", "a.png", "b.png", "--map", "flip"], "--output"),
-        (&["--method", "radiosity"], "explicit-visibility, path-tracing"),
+        (&["--method", "radiosity"], "there are explicit-visibility, "),
         (&["--method", "path-trace"], "did you mean path-tracing?"),
         (&["--set", "rays=9"], "did you mean"),
         (&["--set", "rays_per_element=9"], "one of 16, 64, 144, 256"),

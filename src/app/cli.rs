@@ -9,8 +9,8 @@ use super::compare::Variation;
 use super::console::Verbosity;
 use super::diff::Limit;
 use super::values::{
-    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction, parse_method,
-    parse_size,
+    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction,
+    parse_measuring_seconds, parse_method, parse_size,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -63,6 +63,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Hold methods and settings to the reference: error, energy, time and memory as a page that opens from disk
     Compare(CompareArgs),
+    /// Measure how long frames and passes take: methods, settings and devices in turns, with confidence
+    Bench(BenchArgs),
     /// Print how far picture A is from reference B
     Diff(DiffArgs),
     /// List the GPUs, usable or not, and what they offer
@@ -231,6 +233,43 @@ pub struct CompareArgs {
     #[arg(long, value_name = "FIGURE=LIMIT")]
     pub fail_above: Vec<Limit>,
     /// Options of `linklight render` for all pictures, such as -- --size 480x270 --bounces 2
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    pub options: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// .gltf or .glb files, or builtin:NAME
+    #[arg(value_name = "SCENE", required_unless_present = "read")]
+    pub scenes: Vec<SceneSource>,
+    /// Measurements to write
+    #[arg(short, long, value_name = "FILE.json", required_unless_present = "read")]
+    pub output: Option<PathBuf>,
+    /// Method, see `linklight methods`; may be repeated [default: all]
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub method: Vec<&'static Method>,
+    /// A method's setting or an option of `render` (gpu too), by every value; may be repeated for all combinations
+    #[arg(long, value_name = "NAME=VALUE,...")]
+    pub vary: Vec<Variation>,
+    /// A setting, for every method that has it; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// Measure until ratios to the first subject are known to this fraction, with 99 % confidence
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = parse_fraction)]
+    pub precision: f64,
+    /// ... or for so many seconds
+    #[arg(long, value_name = "S", default_value_t = 60.0, value_parser = parse_measuring_seconds)]
+    pub seconds: f64,
+    /// Say what became slower or faster since this file was written, beyond what the machine did
+    #[arg(long, value_name = "OLD.json")]
+    pub against: Option<PathBuf>,
+    /// Measure nothing: take this file in place of new measurements
+    #[arg(long, value_name = "FILE.json", requires = "against", conflicts_with_all = ["scenes", "output"])]
+    pub read: Option<PathBuf>,
+    /// Fail (exit code 1) if anything became slower
+    #[arg(long, requires = "against")]
+    pub fail_slower: bool,
+    /// Options of `linklight render` for all subjects, such as -- --size 480x270 --bounces 2
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     pub options: Vec<String>,
 }

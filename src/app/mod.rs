@@ -3,6 +3,7 @@
 //! | module | command |
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
+//! | [`bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
 //! | [`devices`] | `linklight devices`: GPUs, usable or not |
@@ -10,6 +11,7 @@
 //!
 //! A command writes what it was asked for to `out`; notes, progress and logs go to standard error.
 
+pub mod bench;
 pub mod cli;
 pub mod compare;
 pub mod console;
@@ -39,6 +41,10 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
             let request = render::RenderRequest::try_from(*args)?;
             let interrupt = interrupt::Interrupt::install();
             render::run(&request, &cli.global, &console, &interrupt, out)
+        }
+        cli::Command::Bench(args) => {
+            let interrupt = interrupt::Interrupt::install();
+            bench::run(&args, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Compare(args) => {
             let interrupt = interrupt::Interrupt::install();

@@ -4,6 +4,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use serde_json::Value;
+
 use crate::methods::settings::suggest;
 use crate::methods::{self, METHODS, Method};
 use crate::report::image::{MAX_PIXELS, MAX_SIDE};
@@ -16,6 +18,40 @@ pub enum SceneSource {
     File(PathBuf),
     /// The name after `builtin:`, known to exist.
     Builtin(String),
+}
+
+impl SceneSource {
+    /// Of all files the scene is made of, or of its name. What cannot be read is the loader's to complain about.
+    pub fn hash(&self) -> blake3::Hash {
+        let mut hasher = blake3::Hasher::new();
+        match self {
+            Self::Builtin(name) => {
+                hasher.update(name.as_bytes());
+                hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
+            }
+            Self::File(path) => {
+                for file in scene_files(path) {
+                    hasher.update(&std::fs::read(&file).unwrap_or_default());
+                }
+            }
+        }
+        hasher.finalize()
+    }
+}
+
+/// The file and, for JSON, the files beside it that it names.
+fn scene_files(path: &Path) -> Vec<PathBuf> {
+    let mut files = vec![path.to_owned()];
+    let text = std::fs::read(path).unwrap_or_default();
+    let Ok(document) = serde_json::from_slice::<Value>(&text) else { return files };
+    for list in ["buffers", "images"] {
+        let uris = document[list].as_array().into_iter().flatten().filter_map(|entry| entry["uri"].as_str());
+        for uri in uris.filter(|uri| !uri.starts_with("data:")) {
+            let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+            files.push(path.with_file_name(name.as_ref()));
+        }
+    }
+    files
 }
 
 impl fmt::Display for SceneSource {
@@ -123,6 +159,11 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// `--exposure`.
 pub fn parse_exposure(text: &str) -> Result<f32, String> {
     number_within(text, -32.0, 32.0, "stops")
+}
+
+/// `--seconds` of `bench`.
+pub fn parse_measuring_seconds(text: &str) -> Result<f64, String> {
+    number_within(text, 0.0, 1e6, "seconds").map(f64::from)
 }
 
 /// A number above 0, at most 1.

@@ -130,6 +130,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1111/cgf.14867"),
     },
     Paper {
+        key: "Efron1979",
+        title: "Bootstrap Methods: Another Look at the Jackknife",
+        authors: "Bradley Efron",
+        year: 1979,
+        venue: "The Annals of Statistics 7(1)",
+        doi: Some("10.1214/aos/1176344552"),
+    },
+    Paper {
         key: "Goldsmith1987",
         title: "Automatic Creation of Object Hierarchies for Ray Tracing",
         authors: "Jeffrey Goldsmith, John Salmon",
@@ -171,6 +179,14 @@ pub const PAPERS: &[Paper] = &[
         doi: None,
     },
     Paper {
+        key: "Mann1947",
+        title: "On a Test of Whether one of Two Random Variables is Stochastically Larger than the Other",
+        authors: "Henry B. Mann, Donald R. Whitney",
+        year: 1947,
+        venue: "The Annals of Mathematical Statistics 18(1)",
+        doi: Some("10.1214/aoms/1177730491"),
+    },
+    Paper {
         key: "Reinhard2002",
         title: "Photographic Tone Reproduction for Digital Images",
         authors: "Erik Reinhard, Michael Stark, Peter Shirley, James Ferwerda",
@@ -195,6 +211,14 @@ pub const PAPERS: &[Paper] = &[
         year: 1997,
         venue: "Journal of Graphics Tools 2(3)",
         doi: Some("10.1080/10867651.1997.10487479"),
+    },
+    Paper {
+        key: "Steele2014",
+        title: "Fast Splittable Pseudorandom Number Generators",
+        authors: "Guy Lewis Steele, Doug Lea, Christine H. Flood",
+        year: 2014,
+        venue: "OOPSLA",
+        doi: Some("10.1145/2660193.2660195"),
     },
     Paper {
         key: "Veach1995",
@@ -235,6 +259,14 @@ pub const PAPERS: &[Paper] = &[
         year: 2004,
         venue: "IEEE Transactions on Image Processing 13(4)",
         doi: Some("10.1109/TIP.2003.819861"),
+    },
+    Paper {
+        key: "Wilcoxon1945",
+        title: "Individual Comparisons by Ranking Methods",
+        authors: "Frank Wilcoxon",
+        year: 1945,
+        venue: "Biometrics Bulletin 1(6)",
+        doi: Some("10.2307/3001968"),
     },
     Paper {
         key: "Woop2013",

@@ -5,7 +5,6 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::plan::Run;
-use crate::app::cli::Global;
 use crate::app::stage::Stage;
 use crate::app::{AppError, frame, measure, render};
 use crate::methods::path_tracing::{Options, PathTracing};
@@ -27,8 +26,8 @@ pub struct Measured {
 
 /// Runs on a device of its own, so that memory is this run's alone. Preparation is timed the second time, when the
 /// driver has compiled everything; frames after a first one.
-pub fn measure(run: &Run, frames: u32, global: &Global, watch: &dyn Watch) -> Result<Measured, AppError> {
-    let context = render::open_device(global, true)?;
+pub fn measure(run: &Run, frames: u32, watch: &dyn Watch) -> Result<Measured, AppError> {
+    let context = render::open_device(&run.global, true)?;
     let stage = Stage::new(&context, &run.request, &TimeLine::default())?;
     let film = Film::new(&context, run.request.width, run.request.height)?;
     drop(frame::Method::prepare(&context, &run.request, &stage, watch)?);
@@ -76,11 +75,10 @@ pub fn path_tracing_curve(
     picture: &Picture,
     samples: u32,
     tone: &ToneSettings,
-    global: &Global,
     watch: &dyn Watch,
 ) -> Result<Vec<CurvePoint>, AppError> {
     let request = &reference.request;
-    let context = render::open_device(global, false)?;
+    let context = render::open_device(&reference.global, false)?;
     let stage = Stage::new(&context, request, &TimeLine::default())?;
     let film = Film::new(&context, request.width, request.height)?;
     let options = Options {

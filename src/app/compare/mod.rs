@@ -1,7 +1,7 @@
 //! `linklight compare SCENE... -o DIR`: methods and settings beside the reference, as a page, as data, and as a test.
 
 mod measured;
-mod plan;
+pub(super) mod plan;
 mod reference;
 
 use std::io::Write;
@@ -35,7 +35,6 @@ const BOUNCE_SAMPLES: u32 = 64;
 /// Everything one command needs.
 struct Session<'a> {
     args: &'a CompareArgs,
-    global: &'a Global,
     watch: Watcher<'a>,
     /// Radiance is shown and judged by FLIP through this.
     tone: ToneSettings,
@@ -56,7 +55,7 @@ pub fn run(
         chosen => chosen.to_vec(),
     };
     let described = method_reports(&methods);
-    let plan = Plan { methods, variations: &args.vary, set: &args.set, options: &args.options };
+    let plan = Plan { methods, variations: &args.vary, set: &args.set, options: &args.options, global };
     plan.check()?;
     let folders = folders(&args.output, &args.scenes)?;
     // All usage errors before the first picture.
@@ -65,7 +64,7 @@ pub fn run(
         work.push((plan.reference(scene, folder)?, plan.runs(scene, folder)?));
     }
     let tone = work.first().map_or_else(ToneSettings::default, |(reference, _)| reference.request.tone);
-    let session = Session { args, global, watch: Watcher::new(console, interrupt), tone };
+    let session = Session { args, watch: Watcher::new(console, interrupt), tone };
 
     let device = measure::device(render::open_device(global, false)?.info());
     let mut report =
@@ -192,7 +191,7 @@ impl Session<'_> {
             Some(path) => Reference::given(path),
             None => {
                 let quality = Quality { noise: self.args.noise, max_samples: self.args.reference_spp };
-                Reference::path_traced(run, quality, self.global, &self.watch)
+                Reference::path_traced(run, quality, &self.watch)
             }
         }
     }
@@ -208,7 +207,7 @@ impl Session<'_> {
             fewer.request.bounces = bounces;
             fewer.request.output.path = folder.join(format!("reference-{bounces}-bounces.exr"));
             let quality = Quality { noise: BOUNCE_NOISE, max_samples: BOUNCE_SAMPLES };
-            let picture = Reference::path_traced(&fewer, quality, self.global, &self.watch)?.picture;
+            let picture = Reference::path_traced(&fewer, quality, &self.watch)?.picture;
             means.push(measured::mean(&picture));
         }
         means.push(measured::mean(&reference.picture));
@@ -222,11 +221,11 @@ impl Session<'_> {
             return Ok(Vec::new());
         }
         let (samples, tone) = (self.args.curve_spp, &self.tone);
-        measured::path_tracing_curve(run, &reference.picture, samples, tone, self.global, &self.watch)
+        measured::path_tracing_curve(run, &reference.picture, samples, tone, &self.watch)
     }
 
     fn run(&self, run: &Run, reference: &Reference, reference_means: &[f64]) -> Result<Done, AppError> {
-        let measured = measured::measure(run, self.args.frames, self.global, &self.watch)?;
+        let measured = measured::measure(run, self.args.frames, &self.watch)?;
         let comparison = compare(&measured.picture, &reference.picture, None, &self.tone)?;
         let exr = &run.request.output.path;
         image::write_exr(exr, &measured.picture)?;
@@ -311,10 +310,10 @@ mod tests {
     #[test]
     fn scenes_of_one_name_get_folders_of_their_own() {
         let output = tempfile::tempdir().unwrap();
-        let scenes = ["a/x.glb", "b/x.gltf", "builtin:gallery?triangles=900"].map(|text| text.parse().unwrap());
+        let scenes = ["a/x.glb", "b/x.gltf", "builtin:gallery?triangles=20000"].map(|text| text.parse().unwrap());
         let folders = folders(output.path(), &scenes).unwrap();
         let names: Vec<_> = folders.iter().map(|folder| folder.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!(names, ["x", "x.2", "gallery-triangles-900"]);
+        assert_eq!(names, ["x", "x.2", "gallery-triangles-20000"]);
         assert!(folders.iter().all(|folder| folder.is_dir()));
     }
 }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Parser as _;
 
 use crate::app::AppError;
-use crate::app::cli::{Cli, Command};
+use crate::app::cli::{Cli, Command, Global};
 use crate::app::render::RenderRequest;
 use crate::app::values::SceneSource;
 use crate::methods::settings::Assignment;
@@ -47,6 +47,8 @@ pub struct Run {
     pub variation: String,
     /// The command that repeats it.
     pub command: String,
+    /// The global options of that command: `--vary gpu=0,1` chooses a device for each.
+    pub global: Global,
 }
 
 /// What all runs share.
@@ -57,6 +59,7 @@ pub struct Plan<'a> {
     pub set: &'a [Assignment],
     /// Options of `render` for all runs, the reference included.
     pub options: &'a [String],
+    pub global: &'a Global,
 }
 
 impl Plan<'_> {
@@ -122,6 +125,9 @@ impl Plan<'_> {
     ) -> Result<Run, AppError> {
         let mut words = vec!["linklight".to_owned(), "render".into(), scene.to_string()];
         words.extend(["-o".to_owned(), output.display().to_string(), "--method".into(), method.key.into()]);
+        if let Some(gpu) = self.global.gpu.as_ref().filter(|_| choice.iter().all(|(name, _)| *name != "gpu")) {
+            words.extend(["--gpu".to_owned(), gpu.clone()]);
+        }
         words.extend(options_for(method, self.options));
         for set in self.set.iter().filter(|set| has_setting(method, &set.key)) {
             words.extend(["--set".to_owned(), format!("{}={}", set.key, set.value)]);
@@ -145,7 +151,8 @@ impl Plan<'_> {
             return Err(AppError::Usage(message.into()));
         }
         let variation = choice.iter().map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(" ");
-        Ok(Run { request, variation, command })
+        let global = Global { validate: self.global.validate || cli.global.validate, ..cli.global };
+        Ok(Run { request, variation, command, global })
     }
 }
 
@@ -192,8 +199,10 @@ mod tests {
 
     fn plan<'a>(variations: &'a [Variation], set: &'a [Assignment], options: &'a [String]) -> Plan<'a> {
         let methods = vec![find("explicit-visibility").unwrap(), find(REFERENCE).unwrap()];
-        Plan { methods, variations, set, options }
+        Plan { methods, variations, set, options, global: &GLOBAL }
     }
+
+    const GLOBAL: Global = Global { gpu: None, validate: false, quiet: false, verbose: 0 };
 
     fn texts(words: &[&str]) -> Vec<String> {
         words.iter().map(|word| (*word).to_owned()).collect()

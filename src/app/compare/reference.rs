@@ -1,14 +1,12 @@
 //! The reference of a comparison: a picture that was given, or one path-traced until its noise is low enough, and kept
 //! in the folder of the report for the next time.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
 use super::plan::Run;
-use crate::app::cli::Global;
 use crate::app::stage::Stage;
-use crate::app::values::SceneSource;
 use crate::app::{AppError, frame, render};
 use crate::gpu::Context;
 use crate::methods::path_tracing::{Options, PathTracing};
@@ -50,13 +48,13 @@ impl Reference {
     }
 
     /// The one kept at the run's output if it is of the same scene and options and good enough, else a new one, kept.
-    pub fn path_traced(run: &Run, quality: Quality, global: &Global, watch: &dyn Watch) -> Result<Self, AppError> {
+    pub fn path_traced(run: &Run, quality: Quality, watch: &dyn Watch) -> Result<Self, AppError> {
         let hash = hash(run)?;
         let path = &run.request.output.path;
         if let Some(kept) = Self::kept(path, &hash, quality) {
             return Ok(kept);
         }
-        let context = render::open_device(global, false)?;
+        let context = render::open_device(&run.global, false)?;
         let stage = Stage::new(&context, &run.request, &TimeLine::default())?;
         let (mut picture, noise, samples) = trace(&context, run, &stage, quality, watch)?;
         let facts = [(HASH, hash), (NOISE, format!("{noise:e}")), (SAMPLES, samples.to_string())];
@@ -131,32 +129,6 @@ fn hash(run: &Run) -> Result<String, AppError> {
     if let Some(EnvironmentSource::File(path)) = &run.request.environment {
         hasher.update(&std::fs::read(path).unwrap_or_default());
     }
-    match &run.request.scene {
-        SceneSource::Builtin(name) => {
-            hasher.update(name.as_bytes());
-        }
-        SceneSource::File(path) => {
-            for file in scene_files(path) {
-                hasher.update(file.as_os_str().as_encoded_bytes());
-                // What cannot be read is the loader's to complain about.
-                hasher.update(&std::fs::read(&file).unwrap_or_default());
-            }
-        }
-    }
+    hasher.update(run.request.scene.hash().as_bytes());
     Ok(hasher.finalize().to_hex().to_string())
-}
-
-/// The file and, for JSON, the files beside it that it names.
-fn scene_files(path: &Path) -> Vec<PathBuf> {
-    let mut files = vec![path.to_owned()];
-    let text = std::fs::read(path).unwrap_or_default();
-    let Ok(document) = serde_json::from_slice::<Value>(&text) else { return files };
-    for list in ["buffers", "images"] {
-        let uris = document[list].as_array().into_iter().flatten().filter_map(|entry| entry["uri"].as_str());
-        for uri in uris.filter(|uri| !uri.starts_with("data:")) {
-            let name = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-            files.push(path.with_file_name(name.as_ref()));
-        }
-    }
-    files
 }
