@@ -4,8 +4,8 @@
 #include "lib/hemisphere.glsl"
 #include "lib/quadtree.glsl"
 
-// Semi-axes of the ellipse in standard deviations of the surface's points. A disc of the surface's own area has 2; a
-// hexagon, as cells of regular meshes are, lies within 2.2, a rectangle within 2.45, half a hexagon within 2.5.
+// Semi-axes of the ellipse of an inner node in standard deviations of the surface's points. A disc of the surface's own
+// area has 2; a rectangle lies within 2.45. Leaves' ellipses hold the corners of their cells.
 const float SURFEL_REACH = 2.5;
 // And of the disc whose solid angle the refinement looks at.
 const float SURFEL_EXTENT = 2.0;

@@ -80,6 +80,22 @@ void main()
         if (squared > 0.0) s.cos_cone = min(s.cos_cone, dot(s.normal, across) / sqrt(squared));
     }
     shape_surfel(m, s);
+    // Exactly so large that the ellipse holds all corners of the cell: with less, light leaks between surfels.
+    float farthest = 0.0;
+    for (uint k = first; k < last; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        vec3 p = (v.x == vertex ? b : v.y == vertex ? c : a) - origin;
+        vec3 q = (v.x == vertex ? c : v.y == vertex ? a : b) - origin;
+        vec3 corners[4] = vec3[4](vec3(0.0), 0.5 * p, 0.5 * q, (p + q) / 3.0);
+        for (uint i = 0; i < 4; ++i) {
+            float along = dot(s.g1, corners[i] - mean), across = dot(s.g2, corners[i] - mean);
+            farthest = max(farthest, along * along + across * across);
+        }
+    }
+    float scale = farthest > 0.0 ? 0.99 / sqrt(farthest) : 1.0;
+    s.g1 *= scale;
+    s.g2 *= scale;
     surfels[leaf] = s;
     moments[leaf] = m;
 }

@@ -75,8 +75,12 @@ void link(uint receiver, QuadtreeSegment of_receiver, Receiver at, vec3 offset, 
         g1 = side / (1.25 * b.extent);
         g2 = cross(normal, side) / (1.25 * b.extent);
     }
-    propose_footprint(local_offset, turn_back(at.frame, normal), turn_back(at.frame, g1), turn_back(at.frame, g2),
-                      1.25 * b.extent, params.n);
+    // The longer semi-axis, from the smaller singular value of (g1, g2).
+    float p = dot(g1, g1), q = dot(g1, g2), r = dot(g2, g2);
+    float least = 0.5 * (p + r) - sqrt(0.25 * (p - r) * (p - r) + q * q);
+    float reach = least > 0.0 ? min(1.0 / sqrt(least), 4.0 * b.extent) : 4.0 * b.extent;
+    propose_footprint(local_offset, turn_back(at.frame, normal), turn_back(at.frame, g1), turn_back(at.frame, g2), reach,
+                      params.n);
 }
 
 void main()

@@ -40,7 +40,7 @@ crate::settings! {
         /// Direction bins along each side of a face of an element's cube map.
         bins: u32 = 12, range 2..=64, unit "bins", paper "8, 12 or 16";
         /// A node may fill so much of a bin's solid angle before it is refined.
-        refinement: f32 = 2.0, range 0.01..=16.0, paper "1";
+        refinement: f32 = 1.0, range 0.01..=16.0, paper "1";
         /// Link all pairs of leaves instead of nodes of the hierarchy.
         brute_force: bool = false, paper "off; its Fig. 10 compares";
         /// Which bins a link goes into.

@@ -1,0 +1,11 @@
+//! Implicit visibility: its passes against plain twins, the hierarchy against all pairs, physics, what moves.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod dynamics;
+mod fixture;
+mod oracle;
+mod physics;
+mod sweep;
+mod trees;
+mod twins;
