@@ -24,7 +24,7 @@ layout(set = 0, binding = 9) uniform sampler2D g_normal;
 layout(set = 0, binding = 10) uniform sampler2D g_albedo;
 layout(set = 0, binding = 11) uniform sampler2D g_specular;
 layout(set = 0, binding = 12) uniform sampler2D g_emission;
-layout(set = 0, binding = 13) uniform usamplerBuffer sender_nodes;      // SENDER_NODE_TEXELS each
+layout(set = 0, binding = 13) uniform usamplerBuffer sender_nodes;      // SENDER_NODE_TEXELS each; compact: one
 layout(set = 0, binding = 14) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
 layout(set = 0, binding = 15, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
 layout(set = 0, binding = 16, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
@@ -37,6 +37,7 @@ layout(set = 0, binding = 22, scalar) buffer Direct { vec3 direct[]; };
 layout(set = 0, binding = 23, scalar) buffer Indirect { vec3 indirect[]; };
 layout(set = 0, binding = 24, scalar) buffer GatherCounts { GatherCount gather_counts[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
+layout(set = 0, binding = 29, scalar) readonly buffer TreeFrames { SenderFrame tree_frame[]; };
 layout(push_constant, scalar) uniform Params {
     vec4 eye;
     float weight;
@@ -53,6 +54,9 @@ layout(push_constant, scalar) uniform Params {
     uint environment_samples;
 } params;
 
+layout(constant_id = 2) const bool COMPACT = false;
+bool sender_is_compact() { return COMPACT; }
+SenderFrame sender_frame() { return tree_frame[0]; }
 uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
 uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }

@@ -69,10 +69,9 @@ Arrival arrival_of(uint node, uvec4 random)
     uint slot;
     vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
     if (options.jitter) {
-        uint drawn = draw_leaf(node, u.z);
-        slot = sender_leaf(drawn);
-        float share = sender_weight(drawn);
-        float by = share > 0.0 ? sender_weight(node) / share : 0.0;
+        float probability;
+        slot = sender_leaf(draw_leaf(node, u.z, probability));
+        float by = 1.0 / probability;
         emitted = by * sender_leaf_light(slot).emitted;
         reflected = by * sender_leaf_light(slot).reflected;
     } else {

@@ -32,6 +32,14 @@ struct SenderNode {
     vec3 power;         // that leaves it, W; radiant intensity along the normal is power / pi
 };
 
+// What compact nodes are quantised in.
+struct SenderFrame {
+    vec3 low;               // of all centres, metres
+    float largest_radius;   // metres
+    vec3 extent;
+    float largest_power;    // of the brightest channel of any node, W
+};
+
 const uint NO_SENDER = 0xffffffffu;
 
 // Texels of a node: centre | radius; axis | cos_cone; area, skip, first leaf, 0. Of its light: power and its sum over

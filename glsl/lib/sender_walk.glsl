@@ -28,26 +28,22 @@ uint next_sender(inout uint node, uint node_count, inout uint visited)
     return NO_SENDER;
 }
 
-// A leaf below `node`, drawn in proportion to the power of the leaves; `u` in 0..1 is used up and left as new.
-uint draw_leaf(uint node, inout float u)
+// A leaf below `node`, drawn about in proportion to the power of the leaves, and the probability it is drawn with; `u` in
+// 0..1 is used up and left as new.
+uint draw_leaf(uint node, inout float u, out float probability)
 {
-    float power = sender_weight(node);
+    probability = 1.0;
     uint skip = sender_skip(node);
     while (skip != node + 1) {
         uint right = sender_skip(node + 1);
-        float left_power = sender_weight(node + 1);
-        float share = power > 0.0 ? clamp(left_power / power, 0.0, 1.0) : 0.5;
-        if (u < share) {
-            u /= share;
-            skip = right;
-            ++node;
-            power = left_power;
-        } else {
-            u = (u - share) / (1.0 - share);
-            node = right;
-            power = sender_weight(node);
-        }
-        u = min(u, 0.99999994);
+        float left_power = sender_weight(node + 1), power = left_power + sender_weight(right);
+        float share = power > 0.0 ? left_power / power : 0.5;
+        bool goes_left = u < share;
+        float taken = goes_left ? share : 1.0 - share;
+        u = min((goes_left ? u : u - share) / taken, 0.99999994);
+        probability *= taken;
+        node = goes_left ? node + 1 : right;
+        skip = goes_left ? right : sender_skip(node);
     }
     return node;
 }

@@ -280,6 +280,7 @@ pub(super) fn gather_samples(
         recorder.submit()?;
     }
     watch.step("final gather", request.spp.into(), request.spp.into())?;
+    display.show_cut_sizes(context, film)?;
     let report = display.report(context)?;
     tracing::info!("{report}");
     Ok(())

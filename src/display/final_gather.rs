@@ -12,7 +12,7 @@
 use super::direct::{self, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
-use super::{PixelView, sample_offset};
+use super::{PixelView, false_color, sample_offset};
 use crate::gpu::shaders::display as passes;
 use crate::gpu::shaders::types::GatherCount;
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
@@ -20,7 +20,7 @@ use crate::report::tonemap::{Operator, ToneSettings};
 use crate::scene::camera::View;
 use crate::stages::bvh::Bvh;
 use crate::stages::film::Film;
-use crate::stages::sender_tree::{Representative, SenderTree, TreeOptions};
+use crate::stages::sender_tree::{NodeLayout, Representative, SenderTree, TreeOptions};
 use crate::stages::surface_maps::PlacedMaps;
 use crate::stages::trace::Tracer;
 use crate::stages::world::World;
@@ -40,6 +40,16 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// What the picture shows.
+    pub enum Shows {
+        /// Light
+        Light = "light",
+        /// How many nodes each pixel gathered from: blue none, red as many as any
+        CutSize = "cut-size",
+    }
+}
+
 crate::settings! {
     /// What `--display final-gather` lets the user choose.
     pub struct Settings {
@@ -55,6 +65,10 @@ crate::settings! {
         environment_samples: u32 = 16, range 1..=1024, unit "rays", paper "not given";
         /// Which leaf stands for an inner node without jitter.
         representative: Representative = Representative::Intensity, paper "not given";
+        /// What the picture shows.
+        gather_shows: Shows = Shows::Light, paper "both, Fig. 11";
+        /// How nodes of the tree lie in memory.
+        node_layout: NodeLayout = NodeLayout::Wide, paper "compact";
         /// How much a difference of normals counts beside distance when the tree is cut.
         normal_weight: f32 = 0.25, range 0.0..=10.0, paper "0: by position alone";
     }
@@ -63,7 +77,7 @@ crate::settings! {
 impl Settings {
     /// How a tree for this display is built.
     pub fn tree_options(&self) -> TreeOptions {
-        TreeOptions { normal_weight: self.normal_weight, representative: self.representative }
+        TreeOptions { normal_weight: self.normal_weight, representative: self.representative, layout: self.node_layout }
     }
 }
 
@@ -157,6 +171,7 @@ impl FinalGather {
             Operator::None => (2, 0.0),
         };
         let settings = &self.settings;
+        let (nodes, compact) = tree.nodes();
         macro_rules! gather {
             ($pass:ident, $params:ident, $surfaces:expr, $constants:expr $(, $field:ident: $value:expr)*) => {{
                 let surfaces = $surfaces;
@@ -173,11 +188,12 @@ impl FinalGather {
                     g_albedo: g_buffer.sampled(&g_buffer.albedo),
                     g_specular: g_buffer.sampled(&g_buffer.specular),
                     g_emission: g_buffer.sampled(&g_buffer.emission),
-                    sender_nodes: &tree.nodes,
+                    sender_nodes: nodes,
                     sender_light: &tree.light,
                     leaves: &tree.leaves,
                     leaf_light: &tree.leaf_light,
                     adaptation: &tree.adaptation,
+                    tree_frame: &tree.frame,
                     positions: &world.positions,
                     environment_info: &environment.info_buffer,
                     environment_map: Sampled { image: &environment.map, sampler: &environment.sampler },
@@ -213,7 +229,7 @@ impl FinalGather {
                 FinalGatherMaps,
                 FinalGatherMapsParams,
                 surfaces,
-                passes::FinalGatherMapsConstants { alpha_test: surfaces.has_holes },
+                passes::FinalGatherMapsConstants { alpha_test: surfaces.has_holes, compact },
                 bvh_nodes: from.bvh.nodes(),
                 bvh_triangles: from.bvh.triangles(),
                 map_frame: &placed.frame,
@@ -229,6 +245,7 @@ impl FinalGather {
                 passes::FinalGatherConstants {
                     alpha_test: surfaces.has_holes,
                     sees_through,
+                    compact,
                 },
                 bvh_nodes: bvh.nodes(),
                 bvh_triangles: bvh.triangles()
@@ -237,10 +254,26 @@ impl FinalGather {
                 FinalGatherRayQuery,
                 FinalGatherRayQueryParams,
                 surfaces,
-                passes::FinalGatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through },
+                passes::FinalGatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through, compact },
                 acceleration_structure: structure
             ),
         }
+    }
+
+    /// Replaces the picture by false colours of the sizes of its cuts, where the settings ask for it; waits for the
+    /// device.                                                                              [Ritschel2008 Fig. 11]
+    pub fn show_cut_sizes(&self, context: &Context, film: &Film) -> Result<(), GpuError> {
+        if self.settings.gather_shows != Shows::CutSize {
+            return Ok(());
+        }
+        let counts = context.download(&self.counts)?;
+        let largest = counts.iter().map(|count| count.cut_size).fold(1.0, f32::max);
+        let color = |count: &GatherCount| match count.visited > 0.0 {
+            true => false_color::of_amount(count.cut_size / largest),
+            false => false_color::NEUTRAL,
+        };
+        context.write(&film.direct, &counts.iter().map(color).collect::<Vec<_>>())?;
+        context.write(&film.indirect, &vec![Vec3::ZERO; counts.len()])
     }
 
     /// What the last picture took; waits for the device.

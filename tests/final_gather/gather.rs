@@ -5,9 +5,10 @@ use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::fixture::{Fixture, Gather, view};
 use crate::twins;
 use glam::{DVec3, Vec3};
-use linklight::display::final_gather::{Settings, Visibility};
+use linklight::display::final_gather::{Settings, Shows, Visibility};
 use linklight::scene::environment::Environment;
 use linklight::scene::{LoadOptions, Material, Scene, builtin};
+use linklight::stages::sender_tree::NodeLayout;
 use std::f32::consts::PI;
 
 const ALBEDO: f32 = 0.6;
@@ -55,6 +56,8 @@ const ALL_SEEN: Settings = Settings {
     gather_clamp: 0.0,
     environment_samples: 1,
     representative: linklight::stages::sender_tree::Representative::Intensity,
+    gather_shows: Shows::Light,
+    node_layout: NodeLayout::Wide,
     normal_weight: 0.25,
 };
 
@@ -120,6 +123,32 @@ fn drawn_leaves_are_right_in_the_mean() {
     println!("errors of the mean of 1 .. 16 pictures: {errors:.4?}");
     // A quarter, give or take.
     assert!(errors[15] < 0.35 * errors[0], "{errors:?}");
+}
+
+/// The paper's 16 bytes a node: bounds are rounded outwards, so cuts grow a little; the sum over all leaves is the same, and
+/// what the rounding of powers costs without jitter is printed.
+#[test]
+fn compact_nodes_cost_little() {
+    let context = TestContext::new();
+    let (fixture, emitted, reflected) = corner_fixture(&context);
+    let run = |node_layout, gather_threshold, gather_jitter| {
+        let settings = Settings { node_layout, gather_threshold, gather_jitter, ..ALL_SEEN };
+        let gather = fixture.gather(&context, settings, &emitted, &reflected, 1);
+        let off = error(&fixture, &gather, &reflected);
+        println!(
+            "{node_layout:?}, threshold {gather_threshold}, jitter {gather_jitter}: off by {off:.4}; {}",
+            gather.report
+        );
+        (off, gather.report.mean_cut)
+    };
+    // Leaves are drawn with known probability, whatever the rounding: no error at all.
+    assert!(run(NodeLayout::Compact, 0.0, true).0 < 4e-3);
+    for threshold in [0.01, 0.1] {
+        let [(wide, cut), (compact, larger_cut)] =
+            [NodeLayout::Wide, NodeLayout::Compact].map(|layout| run(layout, threshold, false));
+        assert!(larger_cut > 0.97 * cut && larger_cut < 1.5 * cut, "{larger_cut} for {cut}");
+        assert!(compact < wide + 0.02, "{compact} for {wide}");
+    }
 }
 
 /// A closed room of albedo 1/2 whose walls emit radiance 1 and reflect a radiosity of pi / 2.        [common ground]

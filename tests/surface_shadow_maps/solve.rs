@@ -20,6 +20,7 @@ const SMALL: Settings = Settings {
     jitter: true,
     light_samples: 8,
     environment_rays: 64,
+    tree_layout: linklight::stages::sender_tree::NodeLayout::Wide,
     tree_normal_weight: 0.25,
     keep_maps: false,
 };

@@ -8,13 +8,14 @@
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 7, scalar) readonly buffer Texels { AtlasTexel texels[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Albedo { vec3 albedo[]; };
-layout(set = 0, binding = 9) uniform usamplerBuffer sender_nodes;       // SENDER_NODE_TEXELS each
+layout(set = 0, binding = 9) uniform usamplerBuffer sender_nodes;       // SENDER_NODE_TEXELS each; compact: one
 layout(set = 0, binding = 10) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
 layout(set = 0, binding = 11, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer Adaptation { float adaptation[]; };
 layout(set = 0, binding = 14, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 15, scalar) writeonly buffer CutSizes { uint cut_sizes[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer TreeFrames { SenderFrame tree_frame[]; };
 layout(push_constant, scalar) uniform Params {
     uint texel_count;
     uint node_count;
@@ -28,6 +29,9 @@ layout(push_constant, scalar) uniform Params {
     uint operator;
 } params;
 
+layout(constant_id = 2) const bool COMPACT = false;
+bool sender_is_compact() { return COMPACT; }
+SenderFrame sender_frame() { return tree_frame[0]; }
 uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
 uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 SenderLeaf sender_shape(uint slot) { return leaves[slot]; }

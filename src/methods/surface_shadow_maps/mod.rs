@@ -28,7 +28,7 @@ use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
 use crate::scene::atlas::{self, Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
-use crate::stages::sender_tree::{SenderTree, SenderTreeError, TreeOptions};
+use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
     MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
 };
@@ -72,6 +72,8 @@ crate::settings! {
         light_samples: u32 = 8, range 1..=1024, unit "points", paper "shadow maps";
         /// Rays of each texel to the environment.
         environment_rays: u32 = 128, range 1..=65536, unit "rays", paper "not given";
+        /// How nodes of the tree lie in memory.
+        tree_layout: NodeLayout = NodeLayout::Wide, paper "compact";
         /// How much a difference of normals counts beside distance when the tree is cut.
         tree_normal_weight: f32 = 0.25, range 0.0..=10.0, paper "0: by position alone";
         /// Keep the maps on disk, in the user's cache folder.
@@ -169,7 +171,11 @@ impl SurfaceShadowMaps {
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, SurfaceShadowMapsError> {
         let atlas = make_atlas(stage, settings.atlas_resolution)?;
         let texels = Texels::new(context, &atlas, stage.world, map_offset(stage.bounds))?;
-        let options = TreeOptions { normal_weight: settings.tree_normal_weight, ..TreeOptions::default() };
+        let options = TreeOptions {
+            normal_weight: settings.tree_normal_weight,
+            layout: settings.tree_layout,
+            ..TreeOptions::default()
+        };
         let tree = SenderTree::build(context, &texels::leaves(&atlas), options)?;
         let maps = match settings.visibility {
             TexelVisibility::Maps => Some(make_maps(context, stage, &atlas, &tree, &settings)?),
@@ -224,17 +230,19 @@ impl SurfaceShadowMaps {
             Operator::Filmic => (1, self.tone.key),
             Operator::None => (2, 0.0),
         };
+        let (nodes, compact) = tree.nodes();
         macro_rules! gather {
             ($pass:ident, $params:ident, { $($field:ident: $value:expr),* $(,)? }) => {{
                 let pass = passes::$pass {
                     $($field: $value,)*
                     texels: &texels.texels,
                     albedo: &texels.albedo,
-                    sender_nodes: &tree.nodes,
+                    sender_nodes: nodes,
                     sender_light: &tree.light,
                     leaves: &tree.leaves,
                     leaf_light: &tree.leaf_light,
                     adaptation: &tree.adaptation,
+                    tree_frame: &tree.frame,
                     irradiance: &s.irradiance,
                     cut_sizes: &s.cut_sizes,
                     params: passes::$params {
@@ -255,6 +263,7 @@ impl SurfaceShadowMaps {
         }
         match (&self.maps, tracer) {
             (Some(PlacedMaps { maps, leaf_places, frame }), _) => gather!(GatherMaps, GatherMapsParams, {
+                constants: passes::GatherMapsConstants { compact },
                 run_offsets: &maps.run_offsets,
                 runs: &maps.runs,
                 map_origins: &maps.origins,
@@ -262,7 +271,7 @@ impl SurfaceShadowMaps {
                 map_frame: frame,
             }),
             (None, Tracer::Compute(bvh, surfaces)) => gather!(GatherRays, GatherRaysParams, {
-                constants: passes::GatherRaysConstants { alpha_test: surfaces.has_holes },
+                constants: passes::GatherRaysConstants { alpha_test: surfaces.has_holes, compact },
                 bvh_nodes: bvh.nodes(),
                 bvh_triangles: bvh.triangles(),
                 triangles: surfaces.triangles,
@@ -272,7 +281,7 @@ impl SurfaceShadowMaps {
                 textures: surfaces.textures,
             }),
             (None, Tracer::RayQuery(structure, surfaces)) => gather!(GatherRayQuery, GatherRayQueryParams, {
-                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through: false },
+                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through: false, compact },
                 acceleration_structure: structure,
                 triangles: surfaces.triangles,
                 triangle_materials: surfaces.triangle_materials,
@@ -337,7 +346,7 @@ impl SurfaceShadowMaps {
 }
 
 /// Texels that a chart has in the mean, at least, where the resolution is not given.
-const TEXELS_PER_CHART: usize = 8;
+const TEXELS_PER_CHART: usize = 3;
 
 fn make_atlas(stage: &Stage<'_>, resolution: u32) -> Result<Atlas, AtlasError> {
     let make = |resolution| Atlas::new(stage.scene, stage.geometry, stage.positions, resolution);

@@ -19,6 +19,16 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// How nodes lie in memory.
+    pub enum NodeLayout {
+        /// 80 bytes of floats
+        Wide = "wide",
+        /// The paper's 16 bytes, for up to 65535 nodes
+        Compact = "compact",
+    }
+}
+
 /// How the tree is cut.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeOptions {
@@ -26,11 +36,12 @@ pub struct TreeOptions {
     /// normals for as far apart as the two ends of the scene.
     pub normal_weight: f32,
     pub representative: Representative,
+    pub layout: NodeLayout,
 }
 
 impl Default for TreeOptions {
     fn default() -> Self {
-        Self { normal_weight: 0.25, representative: Representative::Intensity }
+        Self { normal_weight: 0.25, representative: Representative::Intensity, layout: NodeLayout::Wide }
     }
 }
 

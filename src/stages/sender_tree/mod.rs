@@ -22,17 +22,19 @@
 mod build;
 mod leaves;
 
-pub use build::{MAX_LEAVES, Node, Representative, TreeOptions, TreeTopology, area, corners, normal};
+pub use build::{MAX_LEAVES, Node, NodeLayout, Representative, TreeOptions, TreeTopology, area, corners, normal};
 pub use leaves::{VertexElements, VertexLeaves, disc, parallelogram, triangle, triangle_leaves};
 
 use crate::gpu::shaders::sender_tree as passes;
-use crate::gpu::shaders::types::{LeafLight, SenderLeaf};
+use crate::gpu::shaders::types::{LeafLight, SenderFrame, SenderLeaf};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use glam::Vec3;
 
 /// Texels of a node and of its light; the layout is that of `glsl/lib/sender_tree.glsl`.
 const NODE_TEXELS: usize = 3;
 const LIGHT_TEXELS: usize = 2;
+/// Nodes that 16 bits can point behind.
+pub const MAX_COMPACT_NODES: usize = 65_535;
 
 /// Why there is no tree.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +43,8 @@ pub enum SenderTreeError {
     TooManyLeaves { count: usize },
     #[error("sender {index} at {centre} is not finite; repair the scene's vertices there")]
     NotFinite { index: usize, centre: Vec3 },
+    #[error("{nodes} nodes; the compact layout takes at most {MAX_COMPACT_NODES}: use the wide one, or fewer senders")]
+    TooManyNodes { nodes: usize },
     #[error(transparent)]
     Gpu(#[from] GpuError),
 }
@@ -48,8 +52,11 @@ pub enum SenderTreeError {
 /// The tree on the device.
 pub struct SenderTree {
     pub topology: TreeTopology,
-    /// node_count, depth first.
-    pub nodes: TexelBuffer,
+    /// What the walk reads: node_count, depth first, in the layout that was asked for.
+    nodes: TexelBuffer,
+    compact: Option<TexelBuffer>,
+    /// One: what compact nodes are quantised in.
+    pub frame: Buffer<SenderFrame>,
     /// Power of every node, W.
     pub light: TexelBuffer,
     /// leaf_count, in tree order.
@@ -70,11 +77,17 @@ impl SenderTree {
     /// Builds over `leaves` (world space) on the CPU and uploads. Leaves without area are left out.
     pub fn build(context: &Context, leaves: &[SenderLeaf], options: TreeOptions) -> Result<Self, SenderTreeError> {
         let topology = TreeTopology::build(leaves, options)?;
+        let count = topology.nodes.len();
+        let is_compact = options.layout == NodeLayout::Compact;
+        if is_compact && count > MAX_COMPACT_NODES {
+            return Err(SenderTreeError::TooManyNodes { nodes: count });
+        }
         let ordered: Vec<SenderLeaf> = topology.leaf_order.iter().map(|&i| leaves[i as usize]).collect();
         let texels: Vec<[[u32; 4]; NODE_TEXELS]> = topology.nodes.iter().map(node_texels).collect();
-        let count = topology.nodes.len();
         let tree = Self {
             nodes: context.texel_buffer("sender_tree/nodes", NODE_TEXELS * count.max(1))?,
+            compact: is_compact.then(|| context.texel_buffer("sender_tree/compact nodes", count.max(1))).transpose()?,
+            frame: context.upload("sender_tree/frame", &[frame(&topology)])?,
             light: context.texel_buffer("sender_tree/light", LIGHT_TEXELS * count.max(1))?,
             leaf_light: context.buffer("sender_tree/leaf light", ordered.len())?,
             leaves: context.upload("sender_tree/leaves", &ordered)?,
@@ -88,6 +101,14 @@ impl SenderTree {
         };
         context.write(tree.nodes.buffer(), texels.as_flattened())?;
         Ok(tree)
+    }
+
+    /// What the walk reads, and whether it is compact.
+    pub fn nodes(&self) -> (&TexelBuffer, bool) {
+        match &self.compact {
+            Some(compact) => (compact, true),
+            None => (&self.nodes, false),
+        }
     }
 
     pub fn node_count(&self) -> u32 {
@@ -137,6 +158,16 @@ impl SenderTree {
                 params: passes::AdaptationParams { leaf_count },
             };
             recorder.dispatch(&pass, 256u32);
+            if let Some(compact) = &self.compact {
+                let pass = passes::Pack {
+                    wide_nodes: &self.nodes,
+                    sender_light: &self.light,
+                    compact_nodes: compact.buffer(),
+                    tree_frame: &self.frame,
+                    params: passes::PackParams { node_count: self.node_count() },
+                };
+                recorder.dispatch(&pass, self.node_count());
+            }
         });
     }
 
@@ -150,6 +181,19 @@ impl SenderTree {
             + self.leaf_nodes.size_bytes()
             + self.level_nodes.size_bytes()
     }
+}
+
+/// Room for all centres, and for the root's sphere moved by rounding.
+fn frame(topology: &TreeTopology) -> SenderFrame {
+    let centres = topology.nodes.iter().map(|node| node.centre);
+    let (low, high) = centres.fold((Vec3::MAX, Vec3::MIN), |(low, high), c| (low.min(c), high.max(c)));
+    if low.x > high.x {
+        return SenderFrame { low: Vec3::ZERO, largest_radius: 1.0, extent: Vec3::ONE, largest_power: 0.0 };
+    }
+    let extent = high - low;
+    let radius = topology.nodes.iter().map(|node| node.radius).fold(0.0, f32::max);
+    let largest_radius = 1.001 * (radius + extent.length() / 255.0);
+    SenderFrame { low, largest_radius, extent, largest_power: 0.0 }
 }
 
 fn node_texels(node: &Node) -> [[u32; 4]; NODE_TEXELS] {

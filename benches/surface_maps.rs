@@ -1,0 +1,230 @@
+//! Surface shadow maps and the final gather in one run, as ratios: look-ups in compressed maps against shadow rays between
+//! the same points, making maps against casting the same rays alone, gathers of pixels and of texels, memory.
+//!
+//! `LINKLIGHT_BENCH_SCENE` names another scene than the church.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use glam::{UVec2, Vec3};
+use linklight::display::direct::Sample;
+use linklight::display::final_gather::{self, FinalGather, Gathered, Visibility};
+use linklight::display::g_buffer::GBuffer;
+use linklight::display::shadow_maps::ShadowMaps;
+use linklight::gpu::shaders::surface_maps::{CubeRays, CubeRaysParams};
+use linklight::gpu::shaders::types::{Hit, Ray, SurfaceMapQuery};
+use linklight::gpu::{Buffer, Context, Options, Recorder};
+use linklight::methods::surface_shadow_maps::{Settings, Stage, SurfaceShadowMaps};
+use linklight::report::tonemap::ToneSettings;
+use linklight::scene::camera::View;
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::pose::Pose;
+use linklight::scene::{LoadOptions, builtin, deform};
+use linklight::stages::bvh::Bvh;
+use linklight::stages::film::Film;
+use linklight::stages::surface_maps::{MapInput, MapOptions, Sequence, SurfaceMaps};
+use linklight::stages::trace::{self, Tracer};
+use linklight::stages::work::Unwatched;
+use linklight::stages::world::World;
+use std::hint::black_box;
+use std::time::Instant;
+
+const QUERIES: usize = 1 << 19;
+const SIZE: UVec2 = UVec2::new(160, 90);
+
+/// Shortest of five submissions, seconds.
+fn seconds(context: &Context, mut body: impl FnMut(&mut Recorder<'_>)) -> f64 {
+    let once = |_| {
+        let mut recorder = context.recorder("bench").unwrap();
+        let start = Instant::now();
+        body(&mut recorder);
+        recorder.submit().unwrap();
+        start.elapsed().as_secs_f64()
+    };
+    (0..5).map(once).fold(f64::MAX, f64::min)
+}
+
+fn surface_maps(criterion: &mut Criterion) {
+    let context = Context::new(Options::default()).expect("a Vulkan device");
+    let name = std::env::var("LINKLIGHT_BENCH_SCENE").unwrap_or_else(|_| "builtin:church".into());
+    let scene = builtin::open(&name, &LoadOptions::default()).expect("a scene");
+    let geometry = Geometry::flatten(&scene, 1 << 32).unwrap();
+    let pose = Pose::rest(&scene);
+    let world = World::new(&context, &scene, &geometry, &pose, &Environment::default(), true).unwrap();
+    let vertices = deform::world_vertices(&geometry, &pose);
+    let bounds = vertices.bounds().unwrap();
+    let bvh = Bvh::build(&context, &vertices.positions, &geometry.triangles).unwrap();
+    let tracer = Tracer::compute(&bvh, &world);
+    let stage = Stage {
+        scene: &scene,
+        geometry: &geometry,
+        positions: &vertices.positions,
+        bounds,
+        world: &world,
+        tracer,
+        tone: ToneSettings::default(),
+        seed: 0,
+        cache: None,
+        watch: &Unwatched,
+    };
+
+    let start = Instant::now();
+    let method = SurfaceShadowMaps::prepare(&context, &stage, Settings::default()).unwrap();
+    println!("{name}: {}; made in {:.1} s", method.report(), start.elapsed().as_secs_f64());
+    let maps = &method.maps.as_ref().expect("maps by default").maps;
+    let bytes = maps.maps.size_bytes() as f64 / f64::from(method.texels.count.max(1));
+    println!("  {bytes:.0} bytes a texel at 6 x {0} x {0}", maps.options.resolution);
+
+    making(&context, &method, maps, &tracer, bounds);
+    queries(&context, criterion, &method, maps, &tracer);
+    gathers(&context, &method, &stage, &bvh, &pose);
+}
+
+/// Rays of making the maps against the same first rays alone.
+fn making(context: &Context, method: &SurfaceShadowMaps, maps: &SurfaceMaps, tracer: &Tracer<'_>, bounds: [Vec3; 2]) {
+    let resolution = maps.options.resolution;
+    let pixels = 6 * resolution * resolution;
+    let places = ((1 << 19) / pixels).clamp(1, method.texels.count);
+    let normals: Vec<Vec3> = {
+        let mut by_place = vec![Vec3::ZERO; maps.places.len()];
+        method
+            .atlas
+            .texels
+            .iter()
+            .zip(&maps.places)
+            .for_each(|(texel, &place)| by_place[place as usize] = texel.normal);
+        by_place
+    };
+    let map_normals = context.upload("bench/normals", &normals).unwrap();
+    let rays: Buffer<Ray> = context.buffer("bench/rays", (places * pixels) as usize).unwrap();
+    let hits: Buffer<Hit> = context.buffer("bench/hits", rays.len()).unwrap();
+    let params = CubeRaysParams { first_place: 0, chunk_count: places, resolution };
+    let alone = seconds(context, |recorder| {
+        recorder.dispatch(
+            &CubeRays { map_origins: &maps.origins, map_normals: &map_normals, rays: &rays, params },
+            rays.len(),
+        );
+        trace::closest_hit(recorder, tracer, &rays, &hits, rays.len());
+    });
+    let input = MapInput { atlas: &method.atlas, tracer: *tracer, bounds, content: &[], cache: None };
+    let options = MapOptions { resolution, sequence: Sequence::Spiral, bias: 1.0 };
+    let start = Instant::now();
+    let made = SurfaceMaps::new(context, input, options, &Unwatched).unwrap();
+    let rate = made.ray_count as f64 / start.elapsed().as_secs_f64();
+    let bvh_rate = rays.len() as f64 / alone;
+    println!(
+        "  making maps: {:.2} M rays/s, first rays alone {:.2} M rays/s: {:.0} %",
+        rate / 1e6,
+        bvh_rate / 1e6,
+        100.0 * rate / bvh_rate
+    );
+}
+
+/// Look-ups against shadow rays between random texels that face each other.
+fn queries(
+    context: &Context,
+    criterion: &mut Criterion,
+    method: &SurfaceShadowMaps,
+    maps: &SurfaceMaps,
+    tracer: &Tracer<'_>,
+) {
+    let texels = &method.atlas.texels;
+    let mut state = 1u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % texels.len()
+    };
+    let (mut asked, mut rays) = (Vec::new(), Vec::new());
+    for _ in 0..64 * QUERIES {
+        let (sender, receiver) = (random(), random());
+        let offset = texels[receiver].position - texels[sender].position;
+        if offset.dot(texels[sender].normal) <= 0.0 || offset.dot(texels[receiver].normal) >= 0.0 {
+            continue;
+        }
+        let off = method.texels.ray_offset;
+        let origin = texels[receiver].position + off * texels[receiver].normal;
+        let target = texels[sender].position + off * texels[sender].normal;
+        asked.push(SurfaceMapQuery { point: origin, place: maps.places[sender] });
+        rays.push(Ray { origin, t_min: 0.0, direction: target - origin, t_max: 1.0 });
+        if asked.len() == QUERIES {
+            break;
+        }
+    }
+    let count = asked.len();
+    let asked = context.upload("bench/queries", &asked).unwrap();
+    let rays = context.upload("bench/rays", &rays).unwrap();
+    let (seen, free) = (context.buffer("bench/seen", count).unwrap(), context.buffer("bench/free", count).unwrap());
+    let by_rays = seconds(context, |recorder| trace::any_hit(recorder, tracer, &rays, &free, count));
+    for filters in [false, true] {
+        let by_maps = seconds(context, |recorder| maps.query(recorder, &asked, &seen, count, filters));
+        println!(
+            "  {count} pairs, {}: {:.2} M look-ups/s, {:.2} M shadow rays/s: {:.1} x",
+            if filters { "filtered" } else { "unfiltered" },
+            count as f64 / by_maps / 1e6,
+            count as f64 / by_rays / 1e6,
+            by_rays / by_maps
+        );
+    }
+    let (seen, free) = (context.download(&seen).unwrap(), context.download(&free).unwrap());
+    let differ = seen.iter().zip(&free).map(|(seen, &free)| f64::from((seen - free as f32).abs())).sum::<f64>();
+    println!("  filtered answers differ from rays by {:.2} % in the mean", 100.0 * differ / count as f64);
+    let seen = context.buffer("bench/seen", count).unwrap();
+    criterion.bench_function("look-ups", |b| {
+        b.iter(|| {
+            let mut recorder = context.recorder("bench").unwrap();
+            maps.query(&mut recorder, &asked, &seen, count, true);
+            recorder.submit().unwrap();
+            black_box(());
+        });
+    });
+}
+
+/// Bounces over texels and the gather of a picture, by maps and by rays.
+fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh: &Bvh, pose: &Pose) {
+    let solve = |bounces| seconds(context, |recorder| method.solve(recorder, stage.world, &stage.tracer, bounces));
+    let [direct, one, two] = [0, 1, 2].map(solve);
+    let cuts = context.download(method.cut_sizes()).unwrap();
+    let nodes = cuts.iter().map(|&cut| f64::from(cut)).sum::<f64>();
+    println!(
+        "  {} texels: direct {direct:.3} s, 1 bounce {one:.3} s, 2 bounces {two:.3} s; {:.2} M nodes/s, cut {:.0}",
+        method.texels.count,
+        nodes / (two - one) / 1e6,
+        nodes / f64::from(method.texels.count)
+    );
+    let shadow_maps = ShadowMaps::new(context, pose).unwrap();
+    let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
+    let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
+    let view = View::of_scene(stage.scene, pose, None, Some(stage.bounds), SIZE).unwrap();
+    let mut recorder = context.recorder("bench").unwrap();
+    shadow_maps.draw(&mut recorder, stage.world, pose, stage.bounds);
+    recorder.submit().unwrap();
+    for gather_visibility in [Visibility::Maps, Visibility::Rays, Visibility::None] {
+        let settings = final_gather::Settings { gather_visibility, ..final_gather::Settings::default() };
+        let display = FinalGather::new(context, SIZE.to_array(), settings, ToneSettings::default(), 0).unwrap();
+        let from = Gathered {
+            world: stage.world,
+            tree: &method.tree,
+            tracer: stage.tracer,
+            maps: method.maps.as_ref(),
+            bvh,
+            shadow_maps: &shadow_maps,
+            g_buffer: &g_buffer,
+            view: &view,
+        };
+        let sample = Sample { index: 0, samples: 1, is_unlit: false };
+        let time = seconds(context, |recorder| display.draw(recorder, from, sample, &film));
+        let report = display.report(context).unwrap();
+        println!(
+            "  {SIZE} pixels by {gather_visibility:?}: {time:.3} s, {:.1} k pixels/s, {:.2} M nodes gathered/s, cut {:.0}",
+            report.pixels as f64 / time / 1e3,
+            report.pixels as f64 * report.mean_cut / time / 1e6,
+            report.mean_cut
+        );
+    }
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = surface_maps
+}
+criterion_main!(benches);
