@@ -3,6 +3,8 @@
 
 #[path = "src/gpu/reflection.rs"]
 mod reflection;
+#[path = "src/gpu/shader_cache.rs"]
+mod shader_cache;
 #[path = "src/gpu/shader_codegen.rs"]
 mod shader_codegen;
 #[path = "src/gpu/shader_compiler.rs"]
@@ -13,6 +15,7 @@ use std::path::{Path, PathBuf};
 fn main() {
     println!("cargo::rerun-if-changed=glsl");
     println!("cargo::rerun-if-changed=src/gpu/reflection.rs");
+    println!("cargo::rerun-if-changed=src/gpu/shader_cache.rs");
     println!("cargo::rerun-if-changed=src/gpu/shader_codegen.rs");
     println!("cargo::rerun-if-changed=src/gpu/shader_compiler.rs");
     println!("cargo::rerun-if-env-changed=GLSLC");
@@ -22,12 +25,15 @@ fn main() {
     let mut files = Vec::new();
     collect(&root, &root, &mut files);
     files.sort();
-    let compiled = compile_all(&root, &files);
+    let cache = shader_cache::ShaderCache::new(out.join("shader-cache"), &[&compiler_version(), COMPILER_SOURCE]);
+    let compiled = compile_all(&cache, &root, &files);
+    let used: Vec<PathBuf> = compiled.iter().flatten().map(|(_, kept)| kept.clone()).collect();
+    cache.keep_only(&used);
 
     let mut shaders = Vec::new();
     let mut failed = false;
     for (file, result) in files.iter().zip(compiled) {
-        let reflected = result.map_err(|e| e.to_string()).and_then(|spirv| {
+        let reflected = result.map_err(|e| e.to_string()).and_then(|(spirv, _)| {
             let interface = reflection::reflect(&spirv).map_err(|e| format!("glsl/{}: {e}", file.display()))?;
             Ok(shader_codegen::Shader { file: file.clone(), spirv, interface })
         });
@@ -67,16 +73,28 @@ fn collect(root: &Path, dir: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
+/// How shaders are compiled: a change there is a change of all of them.
+const COMPILER_SOURCE: &str = include_str!("src/gpu/shader_compiler.rs");
+
+/// What the compiler says of itself; nothing where it is linked, or missing (compiling then says so).
+fn compiler_version() -> String {
+    let glslc = std::env::var_os("GLSLC").unwrap_or_else(|| "glslc".into());
+    let output = std::process::Command::new(glslc).arg("--version").output();
+    let version = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    format!("{} {version}", if cfg!(feature = "shaderc") { "shaderc" } else { "glslc" })
+}
+
+/// A compiled shader, and where its words are kept.
+type Compiled = Result<(Vec<u32>, PathBuf), shader_compiler::ShaderError>;
+
 /// Compiles on all cores; results in the order of `files`.
-fn compile_all(root: &Path, files: &[PathBuf]) -> Vec<Result<Vec<u32>, shader_compiler::ShaderError>> {
+fn compile_all(cache: &shader_cache::ShaderCache, root: &Path, files: &[PathBuf]) -> Vec<Compiled> {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let share = files.len().div_ceil(threads).max(1);
     std::thread::scope(|scope| {
         let workers: Vec<_> = files
             .chunks(share)
-            .map(|chunk| {
-                scope.spawn(move || chunk.iter().map(|f| shader_compiler::compile(root, f)).collect::<Vec<_>>())
-            })
+            .map(|chunk| scope.spawn(move || chunk.iter().map(|f| cache.compile(root, f)).collect::<Vec<_>>()))
             .collect();
         workers.into_iter().flat_map(|w| w.join().expect("a shader compile thread panicked")).collect()
     })
