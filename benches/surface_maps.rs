@@ -21,7 +21,7 @@ use linklight::scene::pose::Pose;
 use linklight::scene::{LoadOptions, builtin, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
-use linklight::stages::surface_maps::{MapInput, MapOptions, Sequence, SurfaceMaps};
+use linklight::stages::surface_maps::{MapFilter, MapInput, MapOptions, Sequence, SurfaceMaps};
 use linklight::stages::trace::{self, Tracer};
 use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
@@ -154,11 +154,10 @@ fn queries(
     let rays = context.upload("bench/rays", &rays).unwrap();
     let (seen, free) = (context.buffer("bench/seen", count).unwrap(), context.buffer("bench/free", count).unwrap());
     let by_rays = seconds(context, |recorder| trace::any_hit(recorder, tracer, &rays, &free, count));
-    for filters in [false, true] {
-        let by_maps = seconds(context, |recorder| maps.query(recorder, &asked, &seen, count, filters));
+    for filter in [MapFilter::None, MapFilter::Drawn, MapFilter::Four] {
+        let by_maps = seconds(context, |recorder| maps.query(recorder, &asked, &seen, count, filter));
         println!(
-            "  {count} pairs, {}: {:.2} M look-ups/s, {:.2} M shadow rays/s: {:.1} x",
-            if filters { "filtered" } else { "unfiltered" },
+            "  {count} pairs, filter {filter:?}: {:.2} M look-ups/s, {:.2} M shadow rays/s: {:.1} x",
             count as f64 / by_maps / 1e6,
             count as f64 / by_rays / 1e6,
             by_rays / by_maps
@@ -171,7 +170,7 @@ fn queries(
     criterion.bench_function("look-ups", |b| {
         b.iter(|| {
             let mut recorder = context.recorder("bench").unwrap();
-            maps.query(&mut recorder, &asked, &seen, count, true);
+            maps.query(&mut recorder, &asked, &seen, count, MapFilter::Drawn);
             recorder.submit().unwrap();
             black_box(());
         });

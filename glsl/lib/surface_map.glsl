@@ -6,6 +6,7 @@
 //     uint surface_run_offset(uint pixel)        where the pixel's runs start; its successor's ends them
 //     uint surface_run(uint index)               depth | first place << 16
 #include "lib/cube_map.glsl"
+#include "lib/random.glsl"
 
 uint surface_run_offset(uint pixel);
 uint surface_run(uint index);
@@ -13,7 +14,7 @@ uint surface_run(uint index);
 struct SurfaceMapFrame {
     uint resolution;        // pixels a side of a face
     float codes_per_metre;
-    uint filters;           // 1: between four pixels
+    uint filter_mode;       // 0: the pixel itself, 1: one of four around, drawn by its share, 2: all four
 };
 
 // The depth at a place of the sequence: of the last run that starts at it or before.
@@ -42,7 +43,10 @@ float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 
     uint face = cube_face(d);
     uint resolution = frame.resolution;
     vec2 at = cube_place(d, face, resolution);
-    if (frame.filters == 0) {
+    if (frame.filter_mode < 2) {
+        // A place drawn from a pixel's width around falls into each of the four as often as they share in it.
+        if (frame.filter_mode == 1)
+            at += unit_interval(pcg4d(uvec4(floatBitsToUint(point), place)).xy) - 0.5;
         uvec2 pixel = min(uvec2(max(at, vec2(0.0))), uvec2(resolution - 1));
         return surface_pixel_seen(place, cube_pixel_index(face, pixel, resolution), code);
     }

@@ -1,5 +1,6 @@
 //! The sender tree and the per-pixel final gather: against plain twins, the sum over all leaves, and the furnace.
 
+mod bound;
 #[path = "../common/mod.rs"]
 mod common;
 mod fixture;

@@ -5,7 +5,9 @@ use crate::fixture::{Fixture, builtin_scene, options};
 use glam::Vec3;
 use linklight::gpu::shaders::types::SurfaceMapQuery;
 use linklight::scene::environment::Environment;
-use linklight::stages::surface_maps::{Interval, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed};
+use linklight::stages::surface_maps::{
+    Interval, MapFilter, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed,
+};
 use linklight::stages::work::{Interrupted, Unwatched, Watch};
 
 const SEQUENCES: [Sequence; 3] = [Sequence::Greedy, Sequence::ZigZag, Sequence::Spiral];
@@ -70,16 +72,55 @@ fn queries_on_the_device_agree_with_the_intervals() {
     assert!(expected.iter().filter(|&&seen| seen == 0.0).count() > 1000);
     let buffer = context.upload("test/queries", &queries).unwrap();
     let visibility = context.buffer("test/visibility", queries.len()).unwrap();
-    for filters in [false, true] {
+    for filter in [MapFilter::None, MapFilter::Four] {
         let mut recorder = context.recorder("test").unwrap();
-        maps.query(&mut recorder, &buffer, &visibility, queries.len(), filters);
+        maps.query(&mut recorder, &buffer, &visibility, queries.len(), filter);
         recorder.submit().unwrap();
         let got = context.download(&visibility).unwrap();
         let wrong = got.iter().zip(&expected).filter(|(got, expected)| (**got - **expected).abs() > 1e-3).count();
-        println!("filters {filters}: {wrong} of {} answers differ", queries.len());
+        println!("filter {filter:?}: {wrong} of {} answers differ", queries.len());
         // At the middle of a pixel no other counts.
         assert!(wrong == 0, "{wrong} wrong answers");
     }
+}
+
+/// Drawn filtering is the filter over all four pixels in the mean.
+#[test]
+fn drawn_pixels_are_the_filter_in_the_mean() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let atlas = fixture.atlas(32);
+    let input = fixture.map_input(&atlas, None);
+    let maps = SurfaceMaps::new(&context, input, options(8, Sequence::Spiral), &Unwatched).unwrap();
+    let origins = context.download(&maps.origins).unwrap();
+    let random = &mut Random(23);
+    let count = 40_000;
+    let queries: Vec<SurfaceMapQuery> = (0..count)
+        .map(|_| {
+            let place = random.below(atlas.texels.len() as u32);
+            let other = origins[random.below(atlas.texels.len() as u32) as usize];
+            let spread = Vec3::new(random.unit(), random.unit(), random.unit()) - 0.5;
+            SurfaceMapQuery { point: other + 0.2 * spread, place }
+        })
+        .collect();
+    let buffer = context.upload("test/queries", &queries).unwrap();
+    let visibility = context.buffer("test/visibility", queries.len()).unwrap();
+    let mut run = |filter| {
+        let mut recorder = context.recorder("test").unwrap();
+        maps.query(&mut recorder, &buffer, &visibility, queries.len(), filter);
+        recorder.submit().unwrap();
+        context.download(&visibility).unwrap()
+    };
+    let [none, drawn, four] = [MapFilter::None, MapFilter::Drawn, MapFilter::Four].map(&mut run);
+    assert!(drawn.iter().all(|&v| v == 0.0 || v == 1.0) && drawn != none);
+    let mean = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>() / values.len() as f64;
+    // Where all four agree, the drawn one agrees with them.
+    assert!(
+        drawn.iter().zip(&four).all(|(&drawn, &four)| (drawn > 0.5 || four < 0.9999) && (drawn < 0.5 || four > 1e-4))
+    );
+    println!("seen in the mean: drawn {:.4}, all four {:.4}, unfiltered {:.4}", mean(&drawn), mean(&four), mean(&none));
+    // Three standard errors of a mean of coin tosses.
+    assert!((mean(&drawn) - mean(&four)).abs() < 1.5 / (count as f64).sqrt());
 }
 
 /// Through the middle of a pixel; the twin of `cube_pixel_direction`.

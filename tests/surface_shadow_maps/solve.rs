@@ -14,7 +14,7 @@ const SMALL: Settings = Settings {
     map_resolution: 16,
     sequence: linklight::stages::surface_maps::Sequence::Spiral,
     map_bias: 1.0,
-    map_filter: true,
+    map_filter: linklight::stages::surface_maps::MapFilter::Drawn,
     visibility: TexelVisibility::Rays,
     threshold: 0.02,
     jitter: true,

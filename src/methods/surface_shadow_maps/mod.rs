@@ -30,7 +30,7 @@ use crate::scene::atlas::{self, Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
-    MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
+    MapFilter, MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
 };
 use crate::stages::texels::{self, Texels};
 use crate::stages::trace::Tracer;
@@ -60,8 +60,8 @@ crate::settings! {
         sequence: Sequence = Sequence::Spiral, paper "spiral is best";
         /// How far depths keep from the surfaces they tell apart.
         map_bias: f32 = 1.0, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
-        /// Filter look-ups between four pixels of a map.
-        map_filter: bool = true, paper "not given";
+        /// How look-ups are filtered between pixels of a map.
+        map_filter: MapFilter = MapFilter::Drawn, paper "not given";
         /// What decides whether texels see each other.
         visibility: TexelVisibility = TexelVisibility::Maps, paper "maps";
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.

@@ -51,6 +51,18 @@ pub enum SurfaceMapError {
     Gpu(#[from] GpuError),
 }
 
+crate::choice! {
+    /// How look-ups are filtered between pixels of a map.
+    pub enum MapFilter {
+        /// Not at all
+        None = "none",
+        /// One of the four pixels around, drawn by its share: as fast, with noise
+        Drawn = "drawn",
+        /// All four pixels around
+        Four = "four",
+    }
+}
+
 /// How maps are made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapOptions {
@@ -143,12 +155,16 @@ impl SurfaceMaps {
         })
     }
 
-    /// How shaders read the maps; `filters` between four pixels.
-    pub fn frame(&self, filters: bool) -> SurfaceMapFrame {
+    /// How shaders read the maps.
+    pub fn frame(&self, filter: MapFilter) -> SurfaceMapFrame {
         SurfaceMapFrame {
             resolution: self.options.resolution,
             codes_per_metre: self.codes_per_metre,
-            filters: u32::from(filters),
+            filter_mode: match filter {
+                MapFilter::None => 0,
+                MapFilter::Drawn => 1,
+                MapFilter::Four => 2,
+            },
         }
     }
 
@@ -159,7 +175,7 @@ impl SurfaceMaps {
         queries: &Buffer<SurfaceMapQuery>,
         visibility: &Buffer<f32>,
         count: usize,
-        filters: bool,
+        filter: MapFilter,
     ) {
         let pass = passes::Query {
             queries,
@@ -167,7 +183,7 @@ impl SurfaceMaps {
             run_offsets: &self.run_offsets,
             runs: &self.runs,
             visibility,
-            params: passes::QueryParams { query_count: count as u32, frame: self.frame(filters) },
+            params: passes::QueryParams { query_count: count as u32, frame: self.frame(filter) },
         };
         recorder.dispatch(&pass, count);
     }
@@ -184,11 +200,11 @@ pub struct PlacedMaps {
 
 impl PlacedMaps {
     /// `leaf_order` gives the texel of each leaf of the tree.
-    pub fn new(context: &Context, maps: SurfaceMaps, leaf_order: &[u32], filters: bool) -> Result<Self, GpuError> {
+    pub fn new(context: &Context, maps: SurfaceMaps, leaf_order: &[u32], filter: MapFilter) -> Result<Self, GpuError> {
         let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect();
         Ok(Self {
             leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
-            frame: context.upload("surface_maps/frame", &[maps.frame(filters)])?,
+            frame: context.upload("surface_maps/frame", &[maps.frame(filter)])?,
             maps,
         })
     }
