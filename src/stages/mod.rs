@@ -1,6 +1,7 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
 pub mod bvh;
+pub mod clusters;
 pub mod direction_bins;
 pub mod elements;
 pub mod emissive_triangles;

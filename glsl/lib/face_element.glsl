@@ -1,0 +1,106 @@
+#ifndef LIB_FACE_ELEMENT
+#define LIB_FACE_ELEMENT
+// Elements of face-cluster radiosity: clusters placed in the world, grown only where light asks for them.
+#include "lib/face_cluster.glsl"
+#include "lib/hemisphere.glsl"
+
+// One side of one placed mesh.
+struct ClusterInstance {
+    mat4x3 world_from_tree; // rotation, one scale, translation
+    float scale;
+    uint is_back;           // 1: the clockwise side of its faces
+    uint first_cluster;     // of its tree in the table of clusters
+    uint first_face;        // of its tree in the table of faces
+    uint first_triangle;    // of the scene: place 0 of the tree
+};
+
+struct FaceElement {
+    uint cluster;
+    uint instance;
+    uint parent;            // NO_FACE_ELEMENT for the root of an instance
+    uint children;          // the first of two, or NO_FACE_ELEMENT
+    uint level;
+    uint first_place;       // its faces, in the order of all trees
+    uint place_count;
+    uint is_convex;
+    vec3 center;            // metres, world
+    vec3 axis_x;            // unit
+    vec3 axis_y;
+    vec3 axis_z;            // along the mean normal of its side
+    vec3 half_extent;       // metres
+    float area;             // m2
+    float facing[6];        // as in FaceCluster, of this side
+    vec3 albedo;            // mean
+    float most_albedo;      // of all channels
+    vec3 emission;          // mean, W m^-2 sr^-1
+};
+const uint NO_FACE_ELEMENT = 0xffffffffu;
+
+// What becomes of a (receiver, shooter) pair.
+const uint PAIR_IS_DONE = 0u;
+const uint SPLIT_RECEIVER = 1u;
+const uint SPLIT_SHOOTER = 2u;
+const uint SPLIT_BOTH = 3u;     // a self transfer: all pairs of its children
+const uint IS_LIGHT = 0x80000000u;  // of a shooter: an index of the table of lights
+
+struct PoolCounters {
+    uint element_count;
+    uint is_full;
+    uint transfers;         // pairs that passed light on
+    uint rays;
+    uint largest_unshot;    // bits of a float, W/m2
+    uint deepest_level;
+};
+
+// Normal-projected area, m2: the length of the vector area.                                    [Gobbetti2003 3.1]
+float vector_area(FaceElement e) { return max(e.facing[4] - e.facing[5], 0.0); }
+
+// Bounds of the area projected towards a unit direction, m2.                                   [Gobbetti2003 3.1]
+float least_projected_area(FaceElement e, vec3 direction)
+{
+    return vector_area(e) * max(dot(e.axis_z, direction), 0.0);
+}
+
+float most_projected_area(FaceElement e, vec3 direction)
+{
+    vec3 d = vec3(dot(e.axis_x, direction), dot(e.axis_y, direction), dot(e.axis_z, direction));
+    return max(d.x, 0.0) * e.facing[0] + max(-d.x, 0.0) * e.facing[1]
+         + max(d.y, 0.0) * e.facing[2] + max(-d.y, 0.0) * e.facing[3]
+         + max(d.z, 0.0) * e.facing[4] + max(-d.z, 0.0) * e.facing[5];
+}
+
+// How far the box reaches from its centre along a unit direction, metres.
+float reach(FaceElement e, vec3 direction)
+{
+    return e.half_extent.x * abs(dot(e.axis_x, direction)) + e.half_extent.y * abs(dot(e.axis_y, direction))
+         + e.half_extent.z * abs(dot(e.axis_z, direction));
+}
+
+// Whether any face of `e` may look at anything in the box of `other`.
+bool may_face(FaceElement e, FaceElement other)
+{
+    vec3 offset = other.center - e.center;
+    vec3 axes[3] = vec3[3](e.axis_x, e.axis_y, e.axis_z);
+    float tolerance = 1e-5 * (e.half_extent.x + e.half_extent.y + other.half_extent.x + other.half_extent.y);
+    for (uint k = 0; k < 6; ++k) {
+        if (e.facing[k] <= 1e-3 * e.area) continue;
+        vec3 axis = (k & 1u) == 0 ? axes[k >> 1] : -axes[k >> 1];
+        if (dot(offset, axis) + reach(e, axis) + reach(other, axis) > tolerance) return true;
+    }
+    return false;
+}
+
+// A point of the element's horizontal plane; (0, 0) and (1, 1) are corners of its box.
+vec3 plane_point(FaceElement e, vec2 uv)
+{
+    vec2 d = (2.0 * uv - 1.0) * e.half_extent.xy;
+    return e.center + d.x * e.axis_x + d.y * e.axis_y;
+}
+
+vec2 plane_coordinates(FaceElement e, vec3 point)
+{
+    vec3 d = point - e.center;
+    vec2 along = vec2(dot(d, e.axis_x), dot(d, e.axis_y));
+    return 0.5 + 0.5 * along / max(e.half_extent.xy, vec2(1e-30));
+}
+#endif

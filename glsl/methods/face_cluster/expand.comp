@@ -1,0 +1,33 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/face_element.glsl"
+#include "lib/pair_queue.glsl"
+
+// One thread per pair of the step: what it is split into goes back on the stack.              [Gobbetti2003 Alg. 1]
+// reads taken_pairs, decisions, elements   updates counters, pair_stack   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Decisions { uint decisions[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Elements { FaceElement elements[]; };
+layout(set = 0, binding = 3, scalar) buffer Counters { PairCounters counters[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer Stack { uvec2 pair_stack[]; };
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= counters[0].taken) return;
+    uint decision = decisions[i];
+    if (decision == PAIR_IS_DONE) return;
+
+    uvec2 pair = taken_pairs[i];
+    uint first = elements[decision == SPLIT_SHOOTER ? pair.y : pair.x].children;
+    // Without children only where the pool is full: the host gives up.
+    if (first == NO_FACE_ELEMENT) return;
+    uint count = decision == SPLIT_BOTH ? 4 : 2;
+    uint slot = atomicAdd(counters[0].top, count);
+    for (uint k = 0; k < count; ++k) {
+        uvec2 child = decision == SPLIT_BOTH ? first + uvec2(k & 1u, k >> 1)
+            : decision == SPLIT_RECEIVER ? uvec2(first + k, pair.y) : uvec2(pair.x, first + k);
+        pair_stack[slot + k] = child;
+    }
+}

@@ -1,0 +1,53 @@
+#version 460
+#extension GL_EXT_nonuniform_qualifier : require
+#include "lib/prelude.glsl"
+#include "lib/material.glsl"
+
+// One thread per triangle: mean albedo and emission, from four places of it.
+// reads triangles, triangle_materials, positions, attributes, materials   writes albedo (1), emission (W m^-2 sr^-1)
+// shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer TriangleMaterials { uint triangle_materials[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Emission { vec3 emission[]; };
+layout(set = 1, binding = 0) uniform sampler2D textures[];
+layout(push_constant, scalar) uniform Params { uint triangle_count; } params;
+
+// Width of a quarter of the triangle in each UV set.
+vec2 region_uv;
+
+vec4 sample_texture(uint index, vec2 uv)
+{
+    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(index)], 0).x);
+    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+}
+
+float uv_extent(vec2 a, vec2 b, vec2 c)
+{
+    vec2 ab = b - a, ac = c - a;
+    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / 8.0);
+}
+
+void main()
+{
+    uint t = linear_index();
+    if (t >= params.triangle_count) return;
+    uvec3 v = triangles[t];
+    VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
+    region_uv = vec2(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
+    Material m = materials[triangle_materials[t]];
+    // Centres of the four like triangles that the middles of its sides make of it.
+    vec3 places[4] = vec3[4](vec3(4, 1, 1) / 6.0, vec3(1, 4, 1) / 6.0, vec3(1, 1, 4) / 6.0, vec3(2, 2, 2) / 6.0);
+    vec3 albedo_sum = vec3(0.0), emission_sum = vec3(0.0);
+    bool is_lit = (m.flags & UNLIT) == 0;
+    for (uint k = 0; k < 4; ++k) {
+        VertexAttributes at = interpolated(p, q, r, places[k]);
+        albedo_sum += albedo_of(m, at);
+        if (is_lit) emission_sum += emission_of(m, at);
+    }
+    albedo[t] = albedo_sum / 4.0;
+    emission[t] = emission_sum / 4.0;
+}

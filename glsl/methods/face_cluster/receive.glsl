@@ -1,0 +1,79 @@
+#ifndef FACE_CLUSTER_RECEIVE
+#define FACE_CLUSTER_RECEIVE
+// Bindings 0 to 12 and set 1 of every kernel that decides pairs: whether light passes between two places, and what the
+// receiver keeps of it. Faces of the two elements block nothing: what one side of a cluster does to the other is the
+// matter of its self transfer.
+#include "lib/bvh.glsl"
+#include "lib/cluster_basis.glsl"
+#include "lib/face_element.glsl"
+#include "lib/material.glsl"
+#include "lib/pair_queue.glsl"
+
+layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;
+layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles;
+layout(set = 0, binding = 2, scalar) readonly buffer SceneTriangles { uvec3 triangles[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer TriangleMaterials { uint triangle_materials[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Places { uint triangle_places[]; };            // per triangle
+layout(set = 0, binding = 7, scalar) readonly buffer Elements { FaceElement elements[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Nodes { vec3 element_nodes[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Rules { CubatureNode rules[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Skips { uint cluster_skips[]; };
+layout(set = 0, binding = 11, scalar) buffer Arriving { int arriving[]; };                          // per element, function, channel, axis
+layout(set = 0, binding = 12, scalar) buffer Pool { PoolCounters pool[]; };
+layout(set = 1, binding = 0) uniform sampler2D textures[];
+layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
+layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
+layout(constant_id = 2) const uint IRRADIANCE_FUNCTIONS = 3u;
+layout(constant_id = 3) const uint RADIOSITY_FUNCTIONS = 1u;
+layout(constant_id = 4) const bool ALPHA_TEST = false;
+const uint MOST_NODES = 7u;
+
+uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
+uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
+vec4 sample_texture(uint index, vec2 uv) { return textureLod(textures[nonuniformEXT(index)], uv, 0.0); }
+
+// Places of the faces that block nothing: first and count of the receiver and of the shooter.
+uvec4 passed_places = uvec4(0);
+
+bool is_hole(uint triangle, vec2 barycentrics)
+{
+    uint place = triangle_places[triangle];
+    if (place - passed_places.x < passed_places.y || place - passed_places.z < passed_places.w) return true;
+    if (ALPHA_TEST) {
+        Material material = materials[triangle_materials[triangle]];
+        if (material.alpha_cutoff < 0.0) return false;
+        uvec3 v = triangles[triangle];
+        vec3 weights = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+        return is_hole_of(material, interpolated(attributes[v.x], attributes[v.y], attributes[v.z], weights));
+    }
+    return false;
+}
+
+vec3 receiver_node(uint element, uint k) { return element_nodes[element * (RECEIVER_NODES + SHOOTER_NODES) + k]; }
+vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER_NODES + k); }
+
+// Whether the element's cluster has smaller ones below it.
+bool can_split(FaceElement e) { return cluster_skips[e.cluster] != e.cluster + 1; }
+
+// What arrived at the receiver's nodes (a column a channel), on its functions.                 [Gobbetti2003 Eq. 7]
+void project(mat3 at_nodes[MOST_NODES], out mat3 on_functions[MOST_FUNCTIONS])
+{
+    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
+        on_functions[k] = mat3(0.0);
+        for (uint r = 0; r < RECEIVER_NODES; ++r) on_functions[k] += rules[r].weight * basis(k, rules[r].uv) * at_nodes[r];
+    }
+}
+
+// Adds to what the receiver got so far, in whole units: sums do not depend on their order.
+void receive(uint receiver, mat3 on_functions[MOST_FUNCTIONS], float units)
+{
+    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+        for (uint w = 0; w < 9; ++w) {
+            int value = int(round(clamp(on_functions[k][w / 3][w % 3] * units, -2e8, 2e8)));
+            if (value != 0) atomicAdd(arriving[(receiver * IRRADIANCE_FUNCTIONS + k) * 9 + w], value);
+        }
+    atomicAdd(pool[0].transfers, 1);
+}
+#endif

@@ -1,0 +1,121 @@
+#version 460
+#extension GL_EXT_nonuniform_qualifier : require
+#include "lib/prelude.glsl"
+#include "methods/face_cluster/receive.glsl"
+
+// One thread per (receiver, shooter) pair of the step: transports the shooter's unshot light if the bounds on what the
+// receiver reflects of it are tight enough, else says which of them is to be split.            [Gobbetti2003 3.3]
+// reads counters, taken_pairs, unshot and the tables of receive   updates arriving, pool   writes decisions   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 13, scalar) readonly buffer Counters { PairCounters counters[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Unshot { vec3 unshot[]; };    // per element and function, W/m2
+layout(set = 0, binding = 16, scalar) writeonly buffer Decisions { uint decisions[]; };
+layout(push_constant, scalar) uniform Params {
+    float threshold;    // W, of a transfer's error
+    float units;        // per W/m2
+    uint rays_per_node;
+} params;
+
+float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= counters[0].taken) return;
+    uint receiver = taken_pairs[i].x, shooter = taken_pairs[i].y;
+    FaceElement a = elements[receiver], b = elements[shooter];
+    decisions[i] = PAIR_IS_DONE;
+    float brightest = most(unshot[shooter * RADIOSITY_FUNCTIONS]);
+    if (brightest <= 0.0) return;
+
+    if (receiver == shooter) {
+        // Self transfer: what a cluster that is not convex may send itself.                    [Gobbetti2003 3.3.3]
+        float self_share = a.is_convex != 0 ? 0.0 : 1.0 - vector_area(a) / max(a.area, 1e-30);
+        if (can_split(a) && a.most_albedo * brightest * self_share * a.area > params.threshold) decisions[i] = SPLIT_BOTH;
+        return;
+    }
+    if (!may_face(a, b) || !may_face(b, a)) return;
+
+    vec3 radiosity[MOST_NODES];
+    for (uint e = 0; e < SHOOTER_NODES; ++e) {
+        radiosity[e] = unshot[shooter * RADIOSITY_FUNCTIONS];
+        for (uint k = 1; k < RADIOSITY_FUNCTIONS; ++k)
+            radiosity[e] += basis(k, rules[RECEIVER_NODES + e].uv) * unshot[shooter * RADIOSITY_FUNCTIONS + k];
+        radiosity[e] = max(radiosity[e], vec3(0.0));
+    }
+
+    // Unoccluded: what arrives at each node, and bounds on what the whole receiver would reflect under that light, W.
+    mat3 at_nodes[MOST_NODES];
+    float least[MOST_NODES], greatest[MOST_NODES];
+    float greatest_of_all = 0.0;
+    for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        vec3 x = receiver_node(receiver, r);
+        at_nodes[r] = mat3(0.0);
+        least[r] = 3e38;
+        greatest[r] = 0.0;
+        float sum = 0.0;
+        for (uint e = 0; e < SHOOTER_NODES; ++e) {
+            vec3 d = shooter_node(shooter, e) - x;
+            float squared = max(dot(d, d), 1e-20);
+            vec3 direction = d / sqrt(squared);
+            float sent = least_projected_area(b, -direction), scale = most(radiosity[e]) / (PI * squared);
+            least[r] = min(least[r], scale * sent * least_projected_area(a, direction));
+            greatest[r] = max(greatest[r], scale * most_projected_area(b, -direction) * most_projected_area(a, direction));
+            // m(x, y) B(y); nothing from below the receiver's own plane.                       [Gobbetti2003 Eq. 3]
+            if (dot(direction, a.axis_z) <= 0.0) continue;
+            float share = rules[RECEIVER_NODES + e].weight * sent / (PI * squared);
+            sum += share;
+            at_nodes[r] += outerProduct(share * direction, radiosity[e]);
+        }
+        // No surface receives more than a hemisphere of the shooter's light.
+        if (sum > 1.0) at_nodes[r] /= sum;
+        greatest_of_all = max(greatest_of_all, greatest[r]);
+    }
+    // So little that even an error of all of it does not matter needs no more than one ray.
+    bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
+
+    passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
+    uint turn = a.cluster * 7u + b.cluster * 13u;
+    float free[MOST_NODES];
+    bool any_free = false;
+    uint ray_count = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
+    for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
+    for (uint k = 0; k < ray_count; ++k) {
+        uint r = is_small ? turn % RECEIVER_NODES : k % RECEIVER_NODES;
+        vec3 x = receiver_node(receiver, r), y = shooter_node(shooter, (turn + k) % SHOOTER_NODES);
+        Ray ray = Ray(x, 1e-4, y - x, 1.0 - 1e-4);
+        if (is_hit(traverse(ray, true))) continue;
+        any_free = true;
+        free[r] += 1.0 / float(params.rays_per_node);
+    }
+    atomicAdd(pool[0].rays, ray_count);
+    if (!any_free) return;
+    for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        if (is_small) free[r] = 1.0;
+        at_nodes[r] *= free[r];
+        if (free[r] < 0.999) least[r] = 0.0;
+        if (free[r] == 0.0) greatest[r] = 0.0;
+    }
+
+    mat3 on_functions[MOST_FUNCTIONS];
+    project(at_nodes, on_functions);
+    if (!is_small && (can_split(a) || can_split(b))) {
+        // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
+        float error = 0.0;
+        vec3 strongest = unshot[shooter * RADIOSITY_FUNCTIONS];
+        uint channel = strongest.x >= max(strongest.y, strongest.z) ? 0 : strongest.y >= strongest.z ? 1 : 2;
+        for (uint r = 0; r < RECEIVER_NODES; ++r) {
+            float said = 0.0;
+            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+                said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
+            said *= vector_area(a);
+            error = max(error, max(said - least[r], greatest[r] - said));
+        }
+        if (a.most_albedo * error > params.threshold) {
+            decisions[i] = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
+            return;
+        }
+    }
+    receive(receiver, on_functions, params.units);
+}

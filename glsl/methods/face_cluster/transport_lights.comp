@@ -1,0 +1,84 @@
+#version 460
+#extension GL_EXT_nonuniform_qualifier : require
+#include "lib/prelude.glsl"
+#include "lib/light.glsl"
+#include "methods/face_cluster/receive.glsl"
+
+// One thread per (receiver, light) pair of the step: as transport, for punctual lights and distant emitters, which are
+// never split.                                                                                  [Gobbetti2003 3.3]
+// reads counters, taken_pairs, lights and the tables of receive   updates arriving, pool   writes decisions   shared none
+// Differs from [Gobbetti2003]: there all light comes from clusters.
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 13, scalar) readonly buffer Counters { PairCounters counters[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Lights { Light lights[]; };
+layout(set = 0, binding = 16, scalar) writeonly buffer Decisions { uint decisions[]; };
+layout(push_constant, scalar) uniform Params {
+    float threshold;    // W, of a transfer's error
+    float units;        // per W/m2
+    float far;          // metres: beyond everything
+    float ray_offset;   // metres
+} params;
+
+float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= counters[0].taken) return;
+    uint receiver = taken_pairs[i].x;
+    FaceElement a = elements[receiver];
+    Light light = lights[taken_pairs[i].y & ~IS_LIGHT];
+    decisions[i] = PAIR_IS_DONE;
+
+    mat3 at_nodes[MOST_NODES];
+    float least[MOST_NODES], greatest[MOST_NODES];
+    float greatest_of_all = 0.0;
+    passed_places = uvec4(a.first_place, a.place_count, 0, 0);
+    for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        vec3 x = receiver_node(receiver, r), direction;
+        float distance_to_light;
+        vec3 arrives = light_irradiance(light, x, direction, distance_to_light);
+        least[r] = most(arrives) * least_projected_area(a, direction);
+        greatest[r] = most(arrives) * most_projected_area(a, direction);
+        greatest_of_all = max(greatest_of_all, greatest[r]);
+        at_nodes[r] = dot(direction, a.axis_z) > 0.0 ? outerProduct(direction, arrives) : mat3(0.0);
+    }
+    bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
+    uint turn = a.cluster % RECEIVER_NODES;
+    bool any_free = false;
+    for (uint k = 0; k < (is_small ? 1 : RECEIVER_NODES); ++k) {
+        uint r = is_small ? turn : k;
+        vec3 x = receiver_node(receiver, r), direction;
+        float distance_to_light;
+        light_irradiance(light, x, direction, distance_to_light);
+        Ray ray = Ray(x, params.ray_offset, direction, min(distance_to_light, params.far));
+        bool is_free = greatest[r] > 0.0 && !is_hit(traverse(ray, true));
+        any_free = any_free || is_free;
+        if (!is_free) {
+            at_nodes[r] = mat3(0.0);
+            least[r] = greatest[r] = 0.0;
+        }
+    }
+    atomicAdd(pool[0].rays, is_small ? 1 : RECEIVER_NODES);
+    if (!any_free) return;
+
+    mat3 on_functions[MOST_FUNCTIONS];
+    project(at_nodes, on_functions);
+    if (!is_small && can_split(a)) {
+        float error = 0.0;
+        uint channel = light.intensity.x >= max(light.intensity.y, light.intensity.z) ? 0 : light.intensity.y >= light.intensity.z ? 1 : 2;
+        for (uint r = 0; r < RECEIVER_NODES; ++r) {
+            float said = 0.0;
+            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+                said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
+            said *= vector_area(a);
+            error = max(error, max(said - least[r], greatest[r] - said));
+        }
+        if (a.most_albedo * error > params.threshold) {
+            decisions[i] = SPLIT_RECEIVER;
+            return;
+        }
+    }
+    receive(receiver, on_functions, params.units);
+}
