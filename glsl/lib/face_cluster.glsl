@@ -7,7 +7,7 @@ struct FaceCluster {
     vec3 half_extent;       // metres along the axes
     float area;             // sum of the faces, m2
     float facing[6];        // sums of A (n.d)+ for d = x, -x, y, -y, z, -z of the box, m2
-    uint albedo[3];         // least, mean, most; shared exponent
+    uint albedo[3];         // least and mean, and the most of albedo and specular reflectance; shared exponent
     vec3 emission;          // mean, W m^-2 sr^-1
     uint emission_range[2]; // least and most; shared exponent
     uint first_face;        // in the order of the tree

@@ -45,6 +45,7 @@ const uint IS_LIGHT = 0x80000000u;  // of a shooter: an index of the table of li
 
 struct PoolCounters {
     uint element_count;
+    uint made_count;        // of those, finished
     uint is_full;
     uint transfers;         // pairs that passed light on
     uint rays;

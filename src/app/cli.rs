@@ -164,6 +164,8 @@ pub enum Display {
     FinalGather,
     /// Filter the texels of the method's atlas (surface-shadow-maps)
     Lightmap,
+    /// Shade by the vector irradiance of elements: face-cluster's own, and its default
+    IrradianceVector,
 }
 
 /// Ways to cast rays.

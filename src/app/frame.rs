@@ -9,11 +9,13 @@ use super::stage::Stage;
 use crate::display::direct::Sample;
 use crate::display::final_gather::{FinalGather, Gathered};
 use crate::display::g_buffer::GBuffer;
+use crate::display::irradiance_vector;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{self, ExplicitVisibility};
+use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::report::image::Picture;
@@ -28,6 +30,14 @@ pub enum Method {
     OnElements(Box<VertexShown>),
     Antiradiance(Box<AntiradianceShown>),
     OnTexels(Box<TexelsShown>),
+    FaceClusters(Box<FaceClustersShown>),
+}
+
+/// Face-cluster radiosity with the display stage that shows it.
+pub struct FaceClustersShown {
+    method: FaceClusters,
+    shadow_maps: ShadowMaps,
+    g_buffer: GBuffer,
 }
 
 /// Antiradiance with the display stage that shows it.
@@ -60,6 +70,21 @@ fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibi
         environment: &stage.environment,
         world: &stage.world,
         tracer: stage.tracer(),
+        watch,
+    }
+}
+
+/// As [`explicit_stage`], for face clusters.
+fn cluster_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> face_cluster::Stage<'a> {
+    face_cluster::Stage {
+        scene: &stage.scene,
+        geometry: &stage.geometry,
+        rest_positions: &stage.rest_positions,
+        pose: &stage.pose,
+        bounds: stage.bounds,
+        environment: &stage.environment,
+        world: &stage.world,
+        bvh: &stage.bvh,
         watch,
     }
 }
@@ -107,6 +132,13 @@ impl Method {
             }
             "surface-shadow-maps" => {
                 Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
+            }
+            "face-cluster" => {
+                let method = FaceClusters::prepare(context, &cluster_stage(stage, watch), request.settings()?);
+                let method = method.map_err(AppError::failed)?;
+                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+                let g_buffer = GBuffer::new(context, request.width, request.height)?;
+                Ok(Self::FaceClusters(Box::new(FaceClustersShown { method, shadow_maps, g_buffer })))
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
@@ -201,6 +233,20 @@ impl Method {
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                });
+                recorder.submit()?;
+                Ok(())
+            }
+            Self::FaceClusters(shown) => {
+                let FaceClustersShown { method, shadow_maps, g_buffer } = &mut **shown;
+                method.solve(context, &cluster_stage(stage, watch), request.bounces).map_err(AppError::failed)?;
+                tracing::info!("{}", method.report());
+                let colors = method.colors(context).map_err(AppError::failed)?;
+                let mut recorder = context.recorder("frame")?;
+                recorder.scope("display", |recorder| {
+                    let light = method.light(&colors);
+                    shadow_maps.draw(recorder, world, pose, *bounds);
+                    irradiance_vector::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });
                 recorder.submit()?;
                 Ok(())

@@ -106,14 +106,23 @@ impl TryFrom<RenderArgs> for RenderRequest {
             return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
         }
         let on_texels = args.method.key == "surface-shadow-maps";
-        let default = if on_texels { Display::FinalGather } else { Display::Vertex };
+        let on_clusters = args.method.key == "face-cluster";
+        let default = match args.method.key {
+            "surface-shadow-maps" => Display::FinalGather,
+            "face-cluster" => Display::IrradianceVector,
+            _ => Display::Vertex,
+        };
         let display = (!path_traced).then(|| args.display.unwrap_or(default));
         if let Some(shown) = display
-            && ((on_texels && shown == Display::Vertex) || (!on_texels && shown == Display::Lightmap))
+            && ((on_texels && shown == Display::Vertex)
+                || (!on_texels && shown == Display::Lightmap)
+                || on_clusters != (shown == Display::IrradianceVector))
         {
             let key = args.method.key;
             let (what, others) = if on_texels {
                 ("texels, not vertices", "final-gather or lightmap")
+            } else if on_clusters {
+                ("clusters of faces, not vertices", "irradiance-vector")
             } else {
                 ("vertices, not an atlas", "vertex or final-gather")
             };

@@ -8,6 +8,7 @@
 //! | [`direct`] | what every display stage starts from: background, emission, punctual light |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
 //! | [`lightmap`] | the display stage that filters the texels of an atlas |
+//! | [`irradiance_vector`] | the display stage that shades by the vector irradiance of elements, per pixel or per vertex |
 //! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
 //!
 //! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
@@ -17,6 +18,7 @@ pub mod direct;
 pub mod false_color;
 pub mod final_gather;
 pub mod g_buffer;
+pub mod irradiance_vector;
 pub mod lightmap;
 pub mod shadow_maps;
 pub mod vertex;

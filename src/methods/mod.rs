@@ -5,6 +5,7 @@
 
 pub mod antiradiance;
 pub mod explicit_visibility;
+pub mod face_cluster;
 pub mod implicit_visibility;
 mod papers;
 pub mod path_tracing;
@@ -16,7 +17,7 @@ use serde_json::{Map, Value};
 
 pub use papers::{PAPERS, Paper};
 
-use papers::{DACHSBACHER_2007, DONG_2007, KAJIYA_1986, RITSCHEL_2008, SCHMITZ_2008};
+use papers::{DACHSBACHER_2007, DONG_2007, GOBBETTI_2003, KAJIYA_1986, RITSCHEL_2008, SCHMITZ_2008};
 use settings::{Assignment, SettingError, SettingGroup, Spec};
 
 /// Values of all settings by name, or what is wrong with an assignment.
@@ -71,6 +72,11 @@ pub const METHODS: &[Method] = &[
         "surface-shadow-maps",
         &RITSCHEL_2008,
         "texels of an atlas gather from a tree of texels; compressed depth cube maps tell who sees whom",
+    ),
+    Method::new::<face_cluster::Settings>(
+        "face-cluster",
+        &GOBBETTI_2003,
+        "vector irradiance on higher-order bases is shot between clusters of faces; no links are kept",
     ),
     Method::new::<path_tracing::Settings>(
         "path-tracing",

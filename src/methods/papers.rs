@@ -42,6 +42,16 @@ pub(super) const DONG_2007: Paper = Paper {
     doi: Some("10.1109/PG.2007.37"),
 };
 
+pub(super) const GOBBETTI_2003: Paper = Paper {
+    key: "Gobbetti2003",
+    title: "Hierarchical Higher Order Face Cluster Radiosity for Global Illumination Walkthroughs of Complex \
+            Non-Diffuse Environments",
+    authors: "Enrico Gobbetti, Leonardo Span\u{f2}, Marco Agus",
+    year: 2003,
+    venue: "Computer Graphics Forum 22(3), Eurographics",
+    doi: Some("10.1111/1467-8659.t01-1-00704"),
+};
+
 pub(super) const KAJIYA_1986: Paper = Paper {
     key: "Kajiya1986",
     title: "The Rendering Equation",
@@ -70,6 +80,22 @@ pub const PAPERS: &[Paper] = &[
         year: 2020,
         venue: "Proceedings of the ACM on Computer Graphics and Interactive Techniques 3(2)",
         doi: Some("10.1145/3406183"),
+    },
+    Paper {
+        key: "Andrew1979",
+        title: "Another Efficient Algorithm for Convex Hulls in Two Dimensions",
+        authors: "A. M. Andrew",
+        year: 1979,
+        venue: "Information Processing Letters 9(5)",
+        doi: Some("10.1016/0020-0190(79)90072-3"),
+    },
+    Paper {
+        key: "Arvo1995",
+        title: "Analytic Methods for Simulated Light Transport",
+        authors: "James Arvo",
+        year: 1995,
+        venue: "Dissertation, Yale University",
+        doi: None,
     },
     Paper {
         key: "Baum1989",
@@ -102,6 +128,14 @@ pub const PAPERS: &[Paper] = &[
         year: 1982,
         venue: "Biometrika 69(3)",
         doi: Some("10.1093/biomet/69.3.653"),
+    },
+    Paper {
+        key: "Cools2003",
+        title: "An Encyclopaedia of Cubature Formulas",
+        authors: "Ronald Cools",
+        year: 2003,
+        venue: "Journal of Complexity 19(3)",
+        doi: Some("10.1016/S0885-064X(03)00011-6"),
     },
     Paper {
         key: "Cranley1976",
@@ -137,6 +171,23 @@ pub const PAPERS: &[Paper] = &[
         venue: "The Annals of Statistics 7(1)",
         doi: Some("10.1214/aos/1176344552"),
     },
+    Paper {
+        key: "Ericson2004",
+        title: "Real-Time Collision Detection",
+        authors: "Christer Ericson",
+        year: 2004,
+        venue: "Morgan Kaufmann",
+        doi: None,
+    },
+    Paper {
+        key: "Garland2001",
+        title: "Hierarchical Face Clustering on Polygonal Surfaces",
+        authors: "Michael Garland, Andrew Willmott, Paul S. Heckbert",
+        year: 2001,
+        venue: "Symposium on Interactive 3D Graphics",
+        doi: Some("10.1145/364338.364345"),
+    },
+    GOBBETTI_2003,
     Paper {
         key: "Goldsmith1987",
         title: "Automatic Creation of Object Hierarchies for Ray Tracing",
@@ -187,6 +238,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1214/aoms/1177730491"),
     },
     Paper {
+        key: "Moller1997",
+        title: "Fast, Minimum Storage Ray-Triangle Intersection",
+        authors: "Tomas Moller, Ben Trumbore",
+        year: 1997,
+        venue: "Journal of Graphics Tools 2(1)",
+        doi: Some("10.1080/10867651.1997.10487468"),
+    },
+    Paper {
         key: "Reinhard2002",
         title: "Photographic Tone Reproduction for Digital Images",
         authors: "Erik Reinhard, Michael Stark, Peter Shirley, James Ferwerda",
@@ -219,6 +278,14 @@ pub const PAPERS: &[Paper] = &[
         year: 2014,
         venue: "OOPSLA",
         doi: Some("10.1145/2660193.2660195"),
+    },
+    Paper {
+        key: "Toussaint1983",
+        title: "Solving Geometric Problems with the Rotating Calipers",
+        authors: "Godfried Toussaint",
+        year: 1983,
+        venue: "IEEE MELECON",
+        doi: None,
     },
     Paper {
         key: "Veach1995",

@@ -85,7 +85,19 @@ impl PairQueue {
         context: &Context,
         name: &str,
         seeds: &[UVec2],
+        step: impl FnMut(&mut Recorder<'_>),
+    ) -> Result<PairCounters, PairQueueError> {
+        self.refine_while(context, name, seeds, step, |_| true)
+    }
+
+    /// As [`Self::refine`], as long as `goes_on` says so after each submission; what is left then is dropped.
+    pub fn refine_while(
+        &self,
+        context: &Context,
+        name: &str,
+        seeds: &[UVec2],
         mut step: impl FnMut(&mut Recorder<'_>),
+        mut goes_on: impl FnMut(&PairCounters) -> bool,
     ) -> Result<PairCounters, PairQueueError> {
         let capacity = self.plan.capacity();
         if seeds.len() > capacity as usize {
@@ -106,7 +118,7 @@ impl PairQueue {
                 let PairQueuePlan { max_children, .. } = self.plan;
                 return Err(PairQueueError::Full { capacity, highest: counters.highest, max_children });
             }
-            if counters.top == 0 {
+            if counters.top == 0 || !goes_on(&counters) {
                 return Ok(counters);
             }
         }

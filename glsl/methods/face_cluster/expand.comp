@@ -4,18 +4,20 @@
 #include "lib/pair_queue.glsl"
 
 // One thread per pair of the step: what it is split into goes back on the stack.              [Gobbetti2003 Alg. 1]
-// reads taken_pairs, decisions, elements   updates counters, pair_stack   shared none
+// reads taken_pairs, decisions, elements   updates counters, pool, pair_stack   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Decisions { uint decisions[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 3, scalar) buffer Counters { PairCounters counters[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Stack { uvec2 pair_stack[]; };
+layout(set = 0, binding = 5, scalar) buffer Pool { PoolCounters pool[]; };
 
 void main()
 {
     uint i = linear_index();
     if (i >= counters[0].taken) return;
+    if (i == 0) pool[0].made_count = pool[0].element_count;
     uint decision = decisions[i];
     if (decision == PAIR_IS_DONE) return;
 

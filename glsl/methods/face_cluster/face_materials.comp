@@ -3,8 +3,9 @@
 #include "lib/prelude.glsl"
 #include "lib/material.glsl"
 
-// One thread per triangle: mean albedo and emission, from four places of it.
-// reads triangles, triangle_materials, positions, attributes, materials   writes albedo (1), emission (W m^-2 sr^-1)
+// One thread per triangle: mean albedo, reflectance (specular included, seen along the normal) and emission, from four
+// places of it.
+// reads triangles, triangle_materials, positions, attributes, materials   writes albedo and reflectance (1), emission (W m^-2 sr^-1)
 // shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Triangles { uvec3 triangles[]; };
@@ -12,7 +13,8 @@ layout(set = 0, binding = 1, scalar) readonly buffer TriangleMaterials { uint tr
 layout(set = 0, binding = 2, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Materials { Material materials[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Albedo { vec3 albedo[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer Emission { vec3 emission[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Reflectance { vec3 reflectance[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Emission { vec3 emission[]; };
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint triangle_count; } params;
 
@@ -41,13 +43,16 @@ void main()
     Material m = materials[triangle_materials[t]];
     // Centres of the four like triangles that the middles of its sides make of it.
     vec3 places[4] = vec3[4](vec3(4, 1, 1) / 6.0, vec3(1, 4, 1) / 6.0, vec3(1, 1, 4) / 6.0, vec3(2, 2, 2) / 6.0);
-    vec3 albedo_sum = vec3(0.0), emission_sum = vec3(0.0);
+    vec3 albedo_sum = vec3(0.0), specular_sum = vec3(0.0), emission_sum = vec3(0.0);
     bool is_lit = (m.flags & UNLIT) == 0;
     for (uint k = 0; k < 4; ++k) {
         VertexAttributes at = interpolated(p, q, r, places[k]);
-        albedo_sum += albedo_of(m, at);
+        Surface s = surface_of(m, at, vec3(0, 0, 1), vec4(1, 0, 0, 1), false);
+        albedo_sum += s.reflects ? s.albedo : vec3(0.0);
+        specular_sum += s.reflects ? s.f0 : vec3(0.0);
         if (is_lit) emission_sum += emission_of(m, at);
     }
     albedo[t] = albedo_sum / 4.0;
+    reflectance[t] = min((albedo_sum + specular_sum) / 4.0, vec3(1.0));
     emission[t] = emission_sum / 4.0;
 }

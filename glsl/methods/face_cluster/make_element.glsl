@@ -56,7 +56,9 @@ vec3 laid_on_faces(ClusterInstance inst, uint cluster, vec3 point)
     FaceCluster c = clusters[cluster];
     if ((c.face_count & ~CLUSTER_IS_CONVEX) > 1) return inst.world_from_tree * vec4(clamped_to_box(c, q), 1.0);
     uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + c.first_face]];
-    return nearest_of_triangle(point, positions[v.x], positions[v.y], positions[v.z]);
+    vec3 p0 = positions[v.x], p1 = positions[v.y], p2 = positions[v.z];
+    // Off the border, which other faces share: rays along it would meet them.
+    return mix(nearest_of_triangle(point, p0, p1, p2), (p0 + p1 + p2) / 3.0, 0.05);
 }
 
 void make_element(uint index, uint instance, uint cluster, uint parent, uint level)
@@ -90,7 +92,7 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
     e.most_albedo = max(most.x, max(most.y, most.z));
     e.emission = c.emission;
     elements[index] = e;
-    for (uint k = 0; k < RULE_NODES; ++k)
+    [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k)
         element_nodes[index * RULE_NODES + k] = laid_on_faces(inst, cluster, plane_point(e, rules[k].uv));
     atomicMax(pool[0].deepest_level, level);
 }

@@ -26,9 +26,8 @@ layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
 layout(constant_id = 2) const uint IRRADIANCE_FUNCTIONS = 3u;
-layout(constant_id = 3) const uint RADIOSITY_FUNCTIONS = 1u;
-layout(constant_id = 4) const bool ALPHA_TEST = false;
-const uint MOST_NODES = 7u;
+layout(constant_id = 3) const bool ALPHA_TEST = false;
+layout(constant_id = 5) const bool CLUSTERS_BLOCK = false;  // multiresolution visibility instead of rays
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -51,6 +50,15 @@ bool is_hole(uint triangle, vec2 barycentrics)
     return false;
 }
 
+#include "methods/face_cluster/cluster_visibility.glsl"
+
+// Share of the way from a node of `receiver` to a point that is free, by the one or the other.
+float visibility(FaceElement receiver, Ray ray)
+{
+    if (CLUSTERS_BLOCK) return free_share(ray.origin, ray.origin + ray.t_max * ray.direction, 0.5 * receiver.half_extent.y);
+    return is_hit(traverse(ray, true)) ? 0.0 : 1.0;
+}
+
 vec3 receiver_node(uint element, uint k) { return element_nodes[element * (RECEIVER_NODES + SHOOTER_NODES) + k]; }
 vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER_NODES + k); }
 
@@ -58,19 +66,19 @@ vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER
 bool can_split(FaceElement e) { return cluster_skips[e.cluster] != e.cluster + 1; }
 
 // What arrived at the receiver's nodes (a column a channel), on its functions.                 [Gobbetti2003 Eq. 7]
-void project(mat3 at_nodes[MOST_NODES], out mat3 on_functions[MOST_FUNCTIONS])
+void project(mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions[IRRADIANCE_FUNCTIONS])
 {
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
+    [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
         on_functions[k] = mat3(0.0);
-        for (uint r = 0; r < RECEIVER_NODES; ++r) on_functions[k] += rules[r].weight * basis(k, rules[r].uv) * at_nodes[r];
+        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) on_functions[k] += rules[r].weight * basis(k, rules[r].uv) * at_nodes[r];
     }
 }
 
 // Adds to what the receiver got so far, in whole units: sums do not depend on their order.
-void receive(uint receiver, mat3 on_functions[MOST_FUNCTIONS], float units)
+void receive(uint receiver, mat3 on_functions[IRRADIANCE_FUNCTIONS], float units)
 {
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-        for (uint w = 0; w < 9; ++w) {
+    [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+        [[dont_unroll]] for (uint w = 0; w < 9; ++w) {
             int value = int(round(clamp(on_functions[k][w / 3][w % 3] * units, -2e8, 2e8)));
             if (value != 0) atomicAdd(arriving[(receiver * IRRADIANCE_FUNCTIONS + k) * 9 + w], value);
         }

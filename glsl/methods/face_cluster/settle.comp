@@ -3,8 +3,9 @@
 #include "lib/cluster_basis.glsl"
 #include "lib/face_element.glsl"
 
-// One thread per element, of one level after the other: adds what its parent passes down (by change of basis, a vector
-// only where it lies in the element's half-space) to what it got itself. A leaf keeps it and reflects it next.
+// One thread per element and function, of one level after the other: adds what the element's parent passes down (by
+// change of basis, a vector only where it lies in the element's half-space) to what it got itself. A leaf keeps it and
+// reflects it next.
 //                                                                                    [Gobbetti2003 3.3.4, Alg. 1]
 // reads elements   updates arriving (whole units; from here on bits of floats, W/m2), direct or indirect irradiance,
 // next_unshot   shared none
@@ -22,47 +23,50 @@ layout(push_constant, scalar) uniform Params {
     uint is_kept;           // 0: for reflection alone; punctual light is shown per pixel
 } params;
 
+mat3 arrived(uint element, uint k)
+{
+    mat3 value;
+    uint first = (element * IRRADIANCE_FUNCTIONS + k) * 9;
+    for (uint c = 0; c < 3; ++c)
+        value[c] = intBitsToFloat(ivec3(arriving[first + 3 * c], arriving[first + 3 * c + 1], arriving[first + 3 * c + 2]));
+    return value;
+}
+
 void main()
 {
-    uint e = linear_index();
-    if (e >= params.element_count || elements[e].level != params.level) return;
+    uint i = linear_index();
+    if (i >= params.element_count * IRRADIANCE_FUNCTIONS) return;
+    uint e = i / IRRADIANCE_FUNCTIONS, k = i % IRRADIANCE_FUNCTIONS;
+    if (elements[e].level != params.level) return;
     FaceElement element = elements[e];
 
-    mat3 sums[MOST_FUNCTIONS];
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-        for (uint w = 0; w < 9; ++w)
-            sums[k][w / 3][w % 3] = float(arriving[(e * IRRADIANCE_FUNCTIONS + k) * 9 + w]) * params.inverse_units;
+    // Whole units until here.
+    mat3 sum;
+    for (uint c = 0; c < 3; ++c)
+        sum[c] = vec3(arriving[i * 9 + 3 * c], arriving[i * 9 + 3 * c + 1], arriving[i * 9 + 3 * c + 2]) * params.inverse_units;
 
     if (element.parent != NO_FACE_ELEMENT) {
         FaceElement parent = elements[element.parent];
-        mat3 above[MOST_FUNCTIONS], pushed[MOST_FUNCTIONS];
-        for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
-            pushed[k] = mat3(0.0);
-            for (uint w = 0; w < 9; ++w)
-                above[k][w / 3][w % 3] = intBitsToFloat(arriving[(element.parent * IRRADIANCE_FUNCTIONS + k) * 9 + w]);
-        }
-        for (uint g = 0; g < 16; ++g) {
+        mat3 pushed = mat3(0.0), constant = mat3(0.0);
+        [[dont_unroll]] for (uint g = 0; g < 16; ++g) {
             vec2 uv = gauss_point(g), place = plane_coordinates(parent, plane_point(element, uv));
             mat3 value = mat3(0.0);
-            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) value += basis(k, place) * above[k];
-            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) pushed[k] += gauss_weight(g) * basis(k, uv) * value;
+            [[dont_unroll]] for (uint j = 0; j < IRRADIANCE_FUNCTIONS; ++j) value += basis(j, place) * arrived(element.parent, j);
+            constant += gauss_weight(g) * value;
+            pushed += gauss_weight(g) * basis(k, uv) * value;
         }
-        vec3 along = element.axis_z * pushed[0];
-        for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-            for (uint channel = 0; channel < 3; ++channel)
-                if (along[channel] > 0.0) sums[k][channel] += pushed[k][channel];
+        vec3 along = element.axis_z * constant;
+        for (uint c = 0; c < 3; ++c)
+            if (along[c] > 0.0) sum[c] += pushed[c];
     }
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-        for (uint w = 0; w < 9; ++w)
-            arriving[(e * IRRADIANCE_FUNCTIONS + k) * 9 + w] = floatBitsToInt(sums[k][w / 3][w % 3]);
+    for (uint c = 0; c < 3; ++c)
+        for (uint axis = 0; axis < 3; ++axis) arriving[i * 9 + 3 * c + axis] = floatBitsToInt(sum[c][axis]);
     if (element.children != NO_FACE_ELEMENT) return;
 
     // B = rho n.E, with the mean normal of all faces, shorter than 1 where they differ.        [Gobbetti2003 Eq. 9]
+    if (params.is_kept != 0) irradiance[i] += sum;
+    if (k >= RADIOSITY_FUNCTIONS) return;
     vec3 normal = element.axis_z * (vector_area(element) / max(element.area, 1e-30));
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
-        if (params.is_kept != 0) irradiance[e * IRRADIANCE_FUNCTIONS + k] += sums[k];
-        if (k >= RADIOSITY_FUNCTIONS) continue;
-        vec3 reflected = element.albedo * (normal * sums[k]);
-        next_unshot[e * RADIOSITY_FUNCTIONS + k] += k == 0 ? max(reflected, vec3(0.0)) : reflected;
-    }
+    vec3 reflected = element.albedo * (normal * sum);
+    next_unshot[e * RADIOSITY_FUNCTIONS + k] += k == 0 ? max(reflected, vec3(0.0)) : reflected;
 }

@@ -11,6 +11,7 @@ layout(set = 0, binding = 13, scalar) readonly buffer Counters { PairCounters co
 layout(set = 0, binding = 14, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
 layout(set = 0, binding = 15, scalar) readonly buffer Unshot { vec3 unshot[]; };    // per element and function, W/m2
 layout(set = 0, binding = 16, scalar) writeonly buffer Decisions { uint decisions[]; };
+layout(constant_id = 4) const uint RADIOSITY_FUNCTIONS = 1u;
 layout(push_constant, scalar) uniform Params {
     float threshold;    // W, of a transfer's error
     float units;        // per W/m2
@@ -18,6 +19,20 @@ layout(push_constant, scalar) uniform Params {
 } params;
 
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
+
+// Irradiance vector at x of a triangle of radiosity 1 that faces it: its edges' angles along their normals.
+//                                                                                              [Arvo1995 Eq. 2.5]
+vec3 triangle_vector(vec3 x, vec3 corners[3], vec3 towards)
+{
+    vec3 sum = vec3(0.0);
+    [[dont_unroll]] for (uint k = 0; k < 3; ++k) {
+        vec3 p = corners[k] - x, q = corners[(k + 1) % 3] - x;
+        vec3 across = cross(p, q);
+        float sine = length(across);
+        if (sine > 0.0) sum += across * (atan(sine, dot(p, q)) / (sine * 2.0 * PI));
+    }
+    return dot(sum, towards) < 0.0 ? -sum : sum;
+}
 
 void main()
 {
@@ -37,25 +52,33 @@ void main()
     }
     if (!may_face(a, b) || !may_face(b, a)) return;
 
-    vec3 radiosity[MOST_NODES];
-    for (uint e = 0; e < SHOOTER_NODES; ++e) {
+    vec3 radiosity[SHOOTER_NODES];
+    [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
         radiosity[e] = unshot[shooter * RADIOSITY_FUNCTIONS];
-        for (uint k = 1; k < RADIOSITY_FUNCTIONS; ++k)
+        [[dont_unroll]] for (uint k = 1; k < RADIOSITY_FUNCTIONS; ++k)
             radiosity[e] += basis(k, rules[RECEIVER_NODES + e].uv) * unshot[shooter * RADIOSITY_FUNCTIONS + k];
         radiosity[e] = max(radiosity[e], vec3(0.0));
     }
 
     // Unoccluded: what arrives at each node, and bounds on what the whole receiver would reflect under that light, W.
-    mat3 at_nodes[MOST_NODES];
-    float least[MOST_NODES], greatest[MOST_NODES];
+    mat3 at_nodes[RECEIVER_NODES];
+    float least[RECEIVER_NODES], greatest[RECEIVER_NODES];
     float greatest_of_all = 0.0;
-    for (uint r = 0; r < RECEIVER_NODES; ++r) {
+    // A single face is measured exactly: neighbours stand nearer than nodes can tell.
+    bool is_face = b.place_count == 1;
+    vec3 corners[3];
+    if (is_face) {
+        ClusterInstance inst = instances[b.instance];
+        uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + b.first_place - inst.first_triangle]];
+        corners = vec3[3](positions[v.x], positions[v.y], positions[v.z]);
+    }
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec3 x = receiver_node(receiver, r);
         at_nodes[r] = mat3(0.0);
         least[r] = 3e38;
         greatest[r] = 0.0;
         float sum = 0.0;
-        for (uint e = 0; e < SHOOTER_NODES; ++e) {
+        [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
             vec3 d = shooter_node(shooter, e) - x;
             float squared = max(dot(d, d), 1e-20);
             vec3 direction = d / sqrt(squared);
@@ -68,6 +91,11 @@ void main()
             sum += share;
             at_nodes[r] += outerProduct(share * direction, radiosity[e]);
         }
+        if (is_face && sum > 0.0) {
+            vec3 exact = triangle_vector(x, corners, b.center - x);
+            at_nodes[r] = outerProduct(exact, radiosity[0]);
+            sum = length(exact);
+        }
         // No surface receives more than a hemisphere of the shooter's light.
         if (sum > 1.0) at_nodes[r] /= sum;
         greatest_of_all = max(greatest_of_all, greatest[r]);
@@ -77,37 +105,38 @@ void main()
 
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
     uint turn = a.cluster * 7u + b.cluster * 13u;
-    float free[MOST_NODES];
+    float free[RECEIVER_NODES];
     bool any_free = false;
     uint ray_count = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
-    for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
-    for (uint k = 0; k < ray_count; ++k) {
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
+    [[dont_unroll]] for (uint k = 0; k < ray_count; ++k) {
         uint r = is_small ? turn % RECEIVER_NODES : k % RECEIVER_NODES;
         vec3 x = receiver_node(receiver, r), y = shooter_node(shooter, (turn + k) % SHOOTER_NODES);
         Ray ray = Ray(x, 1e-4, y - x, 1.0 - 1e-4);
-        if (is_hit(traverse(ray, true))) continue;
-        any_free = true;
-        free[r] += 1.0 / float(params.rays_per_node);
+        float share = visibility(a, ray);
+        any_free = any_free || share > 0.0;
+        free[r] += share / float(params.rays_per_node);
     }
     atomicAdd(pool[0].rays, ray_count);
     if (!any_free) return;
-    for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        if (is_small) free[r] = 1.0;
+    float only = free[turn % RECEIVER_NODES] * float(params.rays_per_node);
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        if (is_small) free[r] = only;
         at_nodes[r] *= free[r];
         if (free[r] < 0.999) least[r] = 0.0;
         if (free[r] == 0.0) greatest[r] = 0.0;
     }
 
-    mat3 on_functions[MOST_FUNCTIONS];
+    mat3 on_functions[IRRADIANCE_FUNCTIONS];
     project(at_nodes, on_functions);
     if (!is_small && (can_split(a) || can_split(b))) {
         // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
         float error = 0.0;
         vec3 strongest = unshot[shooter * RADIOSITY_FUNCTIONS];
         uint channel = strongest.x >= max(strongest.y, strongest.z) ? 0 : strongest.y >= strongest.z ? 1 : 2;
-        for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
             float said = 0.0;
-            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+            [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
                 said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
             said *= vector_area(a);
             error = max(error, max(said - least[r], greatest[r] - said));

@@ -31,11 +31,11 @@ void main()
     Light light = lights[taken_pairs[i].y & ~IS_LIGHT];
     decisions[i] = PAIR_IS_DONE;
 
-    mat3 at_nodes[MOST_NODES];
-    float least[MOST_NODES], greatest[MOST_NODES];
+    mat3 at_nodes[RECEIVER_NODES];
+    float least[RECEIVER_NODES], greatest[RECEIVER_NODES];
     float greatest_of_all = 0.0;
     passed_places = uvec4(a.first_place, a.place_count, 0, 0);
-    for (uint r = 0; r < RECEIVER_NODES; ++r) {
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec3 x = receiver_node(receiver, r), direction;
         float distance_to_light;
         vec3 arrives = light_irradiance(light, x, direction, distance_to_light);
@@ -47,30 +47,34 @@ void main()
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
     uint turn = a.cluster % RECEIVER_NODES;
     bool any_free = false;
-    for (uint k = 0; k < (is_small ? 1 : RECEIVER_NODES); ++k) {
+    float free[RECEIVER_NODES];
+    [[dont_unroll]] for (uint k = 0; k < (is_small ? 1 : RECEIVER_NODES); ++k) {
         uint r = is_small ? turn : k;
         vec3 x = receiver_node(receiver, r), direction;
         float distance_to_light;
         light_irradiance(light, x, direction, distance_to_light);
         Ray ray = Ray(x, params.ray_offset, direction, min(distance_to_light, params.far));
-        bool is_free = greatest[r] > 0.0 && !is_hit(traverse(ray, true));
-        any_free = any_free || is_free;
-        if (!is_free) {
-            at_nodes[r] = mat3(0.0);
-            least[r] = greatest[r] = 0.0;
-        }
+        float share = greatest[r] > 0.0 ? visibility(a, ray) : 0.0;
+        any_free = any_free || share > 0.0;
+        free[r] = share;
     }
     atomicAdd(pool[0].rays, is_small ? 1 : RECEIVER_NODES);
     if (!any_free) return;
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        float share = free[is_small ? turn : r];
+        at_nodes[r] *= share;
+        if (share < 0.999) least[r] = 0.0;
+        if (share == 0.0) greatest[r] = 0.0;
+    }
 
-    mat3 on_functions[MOST_FUNCTIONS];
+    mat3 on_functions[IRRADIANCE_FUNCTIONS];
     project(at_nodes, on_functions);
     if (!is_small && can_split(a)) {
         float error = 0.0;
         uint channel = light.intensity.x >= max(light.intensity.y, light.intensity.z) ? 0 : light.intensity.y >= light.intensity.z ? 1 : 2;
-        for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
             float said = 0.0;
-            for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+            [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
                 said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
             said *= vector_area(a);
             error = max(error, max(said - least[r], greatest[r] - said));

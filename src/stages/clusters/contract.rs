@@ -166,8 +166,9 @@ pub fn contract(mesh: &MeshFaces<'_>) -> Merges {
                 left_nodes.push(global(graph.nodes[slot as usize]));
             }
         }
-        for (slot, &face) in graph.faces.iter().enumerate() {
-            left_of[face as usize] = graph.remap[graph.survivor(slot as u32) as usize];
+        for slot in 0..graph.nodes.len() as u32 {
+            let survivor = graph.survivor(slot);
+            left_of[graph.faces[slot as usize] as usize] = graph.remap[survivor as usize];
         }
     }
     let crossing = |edge: &FaceEdge| {

@@ -24,6 +24,7 @@ struct Face {
     normal: Vec3,
     area: f32,
     albedo: Vec3,
+    reflectance: Vec3,
     emission: Vec3,
 }
 
@@ -38,6 +39,7 @@ pub fn measure(mesh: &MeshFaces<'_>, forest: &Forest) -> Vec<FaceCluster> {
             normal: normal.as_vec3(),
             area: normal.length() as f32,
             albedo: mesh.albedo[f as usize],
+            reflectance: mesh.reflectance[f as usize],
             emission: mesh.emission[f as usize],
         }
     };
@@ -64,8 +66,8 @@ fn measure_subtree(
         let left_count = forest.counts[first + 1];
         let right = 2 * left_count as usize;
         let (left_out, right_out) = out[1..].split_at_mut(right - 1);
-        let left = || measure_subtree(forest, faces, first + 1, first_face, left_out);
-        let right = || measure_subtree(forest, faces, first + right, first_face + left_count, right_out);
+        let mut left = || measure_subtree(forest, faces, first + 1, first_face, left_out);
+        let mut right = || measure_subtree(forest, faces, first + right, first_face + left_count, right_out);
         let ((mut outline, normal), (others, _)) =
             if count > TASK_FACES { rayon::join(left, right) } else { (left(), right()) };
         outline.extend(others);
@@ -107,7 +109,7 @@ fn cluster(faces: &[Face], outline: &[Vec3], fallback: Vec3, first_face: u32, fa
         normal += face.normal.as_dvec3();
         albedo += face.albedo.as_dvec3() * a;
         emission += face.emission.as_dvec3() * a;
-        albedo_range = [albedo_range[0].min(face.albedo), albedo_range[1].max(face.albedo)];
+        albedo_range = [albedo_range[0].min(face.albedo), albedo_range[1].max(face.reflectance)];
         emission_range = [emission_range[0].min(face.emission), emission_range[1].max(face.emission)];
     }
     let mean = |sum: DVec3, range: [Vec3; 2]| if area > 0.0 { (sum / area).as_vec3() } else { range[1] };
@@ -152,9 +154,8 @@ fn box_axes(z: Vec3, outline: &[Vec3]) -> Mat3 {
     let mut x = x;
     // The longer side is x.
     let extent = |axis: Vec3| {
-        let (low, high) = outline.iter().fold((f32::MAX, f32::MIN), |(low, high), p| {
-            (low.min(p.dot(axis)), high.max(p.dot(axis)))
-        });
+        let (low, high) =
+            outline.iter().fold((f32::MAX, f32::MIN), |(low, high), p| (low.min(p.dot(axis)), high.max(p.dot(axis))));
         high - low
     };
     if extent(y) > extent(x) {
@@ -165,8 +166,9 @@ fn box_axes(z: Vec3, outline: &[Vec3]) -> Mat3 {
 
 /// `encode_32` of `lib/shared_exponent.glsl`.
 pub fn encode_color(color: Vec3) -> u32 {
-    let largest = color.max_element().min(3e38);
-    if !(largest > 1e-30) {
+    // NaN counts as black.
+    let largest = color.max_element().clamp(0.0, 3e38);
+    if largest.is_nan() || largest <= 1e-30 {
         return 1;
     }
     let exponent = (largest.to_bits() >> 23) as i32 - 126;
@@ -177,5 +179,6 @@ pub fn encode_color(color: Vec3) -> u32 {
 
 /// `decode_32` of `lib/shared_exponent.glsl`.
 pub fn decode_color(word: u32) -> Vec3 {
-    f32::from_bits((word & 0xff) << 23) * Vec3::new((word >> 24) as f32, (word >> 16 & 0xff) as f32, (word >> 8 & 0xff) as f32)
+    f32::from_bits((word & 0xff) << 23)
+        * Vec3::new((word >> 24) as f32, (word >> 16 & 0xff) as f32, (word >> 8 & 0xff) as f32)
 }

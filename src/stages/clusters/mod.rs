@@ -36,6 +36,8 @@ pub struct MeshFaces<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Diffuse reflectance, one per triangle.
     pub albedo: &'a [Vec3],
+    /// All that is reflected, one per triangle: bounds what a change of irradiance shows.
+    pub reflectance: &'a [Vec3],
     /// Emitted radiance, one per triangle, W m^-2 sr^-1.
     pub emission: &'a [Vec3],
 }
@@ -101,9 +103,8 @@ pub fn normal_projected_area(cluster: &FaceCluster) -> f32 {
 /// Upper bound of the projected area towards `direction` (unit), m2.                        [Gobbetti2003 3.1]
 pub fn most_projected_area(cluster: &FaceCluster, direction: Vec3) -> f32 {
     let along = axes(cluster).transpose() * direction;
-    let sides = (0..3).map(|k| {
-        (along[k] * cluster.facing[2 * k]).max(0.0) + (-along[k] * cluster.facing[2 * k + 1]).max(0.0)
-    });
+    let sides =
+        (0..3).map(|k| (along[k] * cluster.facing[2 * k]).max(0.0) + (-along[k] * cluster.facing[2 * k + 1]).max(0.0));
     sides.sum()
 }
 

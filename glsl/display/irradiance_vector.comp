@@ -1,0 +1,105 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/brdf.glsl"
+#include "lib/cluster_basis.glsl"
+#include "lib/face_element.glsl"
+
+// One thread per pixel: all light but the punctual one, by the vector irradiance of the leaf element seen there. Each
+// channel shines along its own vector.                                                 [Gobbetti2003 3.5, Eq. 10]
+// reads the G-buffer, triangles, positions, normals, elements, triangle_elements, direct_irradiance and
+//       indirect_irradiance (per element and function, W/m2), colors (per element)
+// updates direct, indirect [pixel_count]   shared none
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
+layout(set = 0, binding = 1) uniform sampler2D g_position;
+layout(set = 0, binding = 2) uniform sampler2D g_normal;
+layout(set = 0, binding = 3) uniform sampler2D g_albedo;
+layout(set = 0, binding = 4) uniform sampler2D g_specular;
+layout(set = 0, binding = 5) uniform sampler2D g_emission;
+layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Normals { vec3 normals[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Elements { FaceElement elements[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer TriangleElements { uvec2 triangle_elements[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { mat3 direct_irradiance[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { mat3 indirect_irradiance[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Colors { vec3 colors[]; };
+layout(set = 0, binding = 14, scalar) buffer Direct { vec3 direct[]; };
+layout(set = 0, binding = 15, scalar) buffer Indirect { vec3 indirect[]; };
+layout(constant_id = 0) const uint IRRADIANCE_FUNCTIONS = 3u;
+// eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
+layout(push_constant, scalar) uniform Params {
+    vec4 eye;
+    float weight;
+    float least_alpha;      // lobes are at least so wide: one direction stands for all light
+    uint per_vertex;        // shade at the triangle's corners and interpolate
+    uint shows_colors;      // unlit
+} params;
+
+// Radiance towards the eye of light along the columns of `vectors`.
+vec3 radiance(Surface s, vec3 to_eye, mat3 vectors)
+{
+    vec3 sum = vec3(0.0);
+    for (uint channel = 0; channel < 3; ++channel) {
+        float size = length(vectors[channel]), along = dot(s.normal, vectors[channel]);
+        if (along > 0.0) sum[channel] = brdf_value(s, to_eye, vectors[channel] / size)[channel] * along;
+    }
+    return sum;
+}
+
+void shade(Surface s, uint element, vec3 point, out vec3 direct_radiance, out vec3 indirect_radiance)
+{
+    vec2 uv = clamp(plane_coordinates(elements[element], point), 0.0, 1.0);
+    mat3 d = mat3(0.0), i = mat3(0.0);
+    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
+        float b = basis(k, uv);
+        d += b * direct_irradiance[element * IRRADIANCE_FUNCTIONS + k];
+        i += b * indirect_irradiance[element * IRRADIANCE_FUNCTIONS + k];
+    }
+    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - point);
+    direct_radiance = radiance(s, to_eye, d);
+    indirect_radiance = radiance(s, to_eye, i);
+}
+
+void main()
+{
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    ivec2 size = textureSize(visible_triangles, 0);
+    if (any(greaterThanEqual(pixel, size))) return;
+    uint seen = texelFetch(visible_triangles, pixel, 0).x;
+    vec4 emitted = texelFetch(g_emission, pixel, 0);
+    if (seen == 0 || (emitted.w <= 0.5 && params.shows_colors == 0)) return;
+
+    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
+    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
+    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
+    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, max(n.w, params.least_alpha), emitted.rgb, n.xyz, true);
+
+    uvec3 v = triangles[seen - 1];
+    bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), to_eye) < 0.0;
+    uvec2 sides = triangle_elements[seen - 1];
+    uint element = is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
+    if (element == NO_FACE_ELEMENT) return;
+
+    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
+    if (params.shows_colors != 0) {
+        direct[index] += params.weight * colors[element];
+        return;
+    }
+    vec3 direct_sum, indirect_sum;
+    if (params.per_vertex == 0) {
+        shade(s, element, position.xyz, direct_sum, indirect_sum);
+    } else {
+        direct_sum = indirect_sum = vec3(0.0);
+        vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
+        for (uint k = 0; k < 3; ++k) {
+            s.normal = is_back ? -normals[v[k]] : normals[v[k]];
+            vec3 d, i;
+            shade(s, element, positions[v[k]], d, i);
+            direct_sum += w[k] * d;
+            indirect_sum += w[k] * i;
+        }
+    }
+    direct[index] += params.weight * direct_sum;
+    indirect[index] += params.weight * indirect_sum;
+}

@@ -1,0 +1,282 @@
+//! Hierarchical higher-order face cluster radiosity [Gobbetti2003]: light is exchanged between clusters of faces as
+//! vector irradiance on higher-order bases, so that the fine mesh is touched only when it is drawn.
+//!
+//! Every mesh is clustered once, down to its faces. Elements are clusters placed in the world, made only where a
+//! transfer of light asks for them. Each iteration shoots all unshot light: pairs of a receiver and a shooter are split
+//! until the bounds on what the receiver would reflect are tight, what arrives is pushed down to the leaves, reflected,
+//! and pulled up as the next iteration's unshot light. No links are kept.
+//!
+//! | paper | here | unit | buffer |
+//! |---|---|---|---|
+//! | face cluster | [`FaceCluster`](crate::gpu::shaders::types::FaceCluster) | – | [`Placement::clusters`] |
+//! | A_i, A_i^(n), D+, D- | area, `vector_area`, `facing` | m2 | of a cluster |
+//! | element i | [`FaceElement`] | – | [`State::elements`] |
+//! | Phi_a | `basis`, [`Settings::irradiance_basis`], [`Settings::radiosity_basis`] | 1 | `lib/cluster_basis.glsl` |
+//! | m(x, y), K | made where needed | m^-2 | `transport` |
+//! | E_i,a | irradiance vector, a column a channel; direct and indirect | W/m2 | `face-cluster/direct`, `face-cluster/indirect` |
+//! | Delta E | arriving, whole units | W/m2 | `face-cluster/arriving` |
+//! | Delta B, Delta B' | unshot, next unshot | W/m2 | `face-cluster/unshot`, `face-cluster/next unshot` |
+//! | delta_ij | error against [`Settings::threshold`] | W | `transport` |
+//! | F_ii | `self_share` | 1 | `transport` |
+//!
+//! **Per frame without new clusters:** lights, environment; everything is shot anew. **With new clusters:** surfaces
+//! and materials.
+//!
+//! Differs from [Gobbetti2003]: pairs are refined level by level by all threads at once and their contributions summed
+//! in whole units, so that the result does not depend on their order; punctual lights and an environment shine too;
+//! cubature nodes are laid on the faces, and a shooter of one face is measured exactly;
+//! errors are judged against the light they belong to; a transfer takes one shadow ray per receiver node unless told otherwise;
+//! (1 - F_ii) is not applied, since the vector area already holds it; irradiance is allotted to inner elements too.
+//!
+//! [Gobbetti2003]: crate::methods::PAPERS
+
+mod lights;
+mod placement;
+mod report;
+pub mod rules;
+mod shooting;
+pub mod showing;
+mod transfer;
+
+pub use placement::Placement;
+pub use report::Report;
+
+use crate::gpu::shaders::types::{CubatureNode, FaceElement, PoolCounters};
+use crate::gpu::{Buffer, Context, GpuError};
+use crate::scene::Scene;
+use crate::scene::environment::Environment;
+use crate::scene::geometry::Geometry;
+use crate::scene::pose::Pose;
+use crate::stages::bvh::Bvh;
+use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
+use crate::stages::work::{Interrupted, Watch};
+use crate::stages::world::World;
+use glam::{UVec2, Vec3};
+use rules::{Basis, Rule};
+use showing::{Shading, Shown};
+
+/// Pairs of a step of refinement.
+const BATCH: u32 = 1 << 14;
+/// Pairs that refinement starts from at once.
+const SEEDS: usize = 1 << 16;
+
+crate::choice! {
+    /// Ways to find what blocks light.
+    pub enum Visibility {
+        /// Rays at the faces: exact
+        Rays = "rays",
+        /// Clusters as small as their shadows matter, more or less opaque
+        Clusters = "clusters",
+    }
+}
+
+crate::settings! {
+    /// What face-cluster radiosity lets the user choose.
+    pub struct Settings {
+        /// Error of a transfer that is let pass, as a share of the power of the light it belongs to: emitted, distant,
+        /// punctual, or reflected once.
+        threshold: f32 = 1e-5, range 1e-9..=1.0, paper "1e-5 of all emitted power";
+        /// Functions that vector irradiance is stored on.
+        irradiance_basis: Basis = Basis::Linear, paper "constant, linear or quadratic";
+        /// Functions that unshot radiosity is stored on: no more than those of irradiance.
+        radiosity_basis: Basis = Basis::Constant, paper "constant";
+        /// Cubature rule on receivers; a cubic basis needs sixteen nodes.
+        receiver_rule: Rule = Rule::Seven, paper "degree 5 (7 nodes)";
+        /// Cubature rule on shooters.
+        shooter_rule: Rule = Rule::Six, paper "degree 4 (6 nodes)";
+        /// What says whether light passes.
+        visibility: Visibility = Visibility::Rays, paper "clusters";
+        /// Shadow rays from each receiver node, to shooter nodes by turns.
+        rays_per_node: u32 = 1, range 1..=16, unit "rays", paper "one to every shooter node: 6";
+        /// Iterations end when the largest unshot radiosity falls below this share of the first.
+        convergence: f32 = 1e-3, range 0.0..=1.0, paper "a user-defined threshold; 10 iterations";
+        /// Clusters are not split below this share of the scene's area.
+        least_area: f32 = 1e-7, range 0.0..=1e-2, paper "down to faces";
+        /// Elements that may be made, at most.
+        max_elements: u32 = 262144, range 64..=1048576, paper "not limited";
+        /// Distant emitters that stand for an environment.
+        environment_directions: u32 = 128, range 8..=2048, paper "no environment";
+        /// Where light is turned into colour.
+        shading: Shading = Shading::Pixel, paper "vertex; pixel announced";
+        /// GGX alpha of the narrowest lobe: one direction a channel stands for all light.
+        least_alpha: f32 = 0.2, range 0.001..=1.0, paper "moderately glossy: a Phong exponent of 10, alpha 0.41";
+        /// What the picture shows.
+        show: Shown = Shown::Light, paper "light, and leaf clusters";
+    }
+}
+
+/// Why the method cannot be prepared or solved.
+#[derive(Debug, thiserror::Error)]
+pub enum FaceClusterError {
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    Queue(#[from] PairQueueError),
+    #[error(
+        "radiosity_basis={radiosity} has functions that irradiance_basis={irradiance} has not; choose a radiosity basis of \
+         at most the irradiance's"
+    )]
+    Bases { radiosity: String, irradiance: String },
+    #[error(
+        "receiver_rule={rule} is of degree {degree}, but projecting on irradiance_basis={basis} needs degree {needed}; \
+         choose a rule of more nodes (sixteen) or a lower basis"
+    )]
+    Rule { rule: String, degree: u32, basis: String, needed: u32 },
+    #[error(
+        "all {capacity} elements are in use and light asks for more; raise max_elements or threshold (now {threshold:e})"
+    )]
+    PoolFull { capacity: u32, threshold: f32 },
+    #[error("face-cluster radiosity needs {needed} bytes, {available} are available; lower max_elements or the bases")]
+    OutOfMemory { needed: u64, available: u64 },
+}
+
+/// What the method reads of the scene: plain data, and its form on the device in the present pose.
+#[derive(Clone, Copy)]
+pub struct Stage<'a> {
+    pub scene: &'a Scene,
+    pub geometry: &'a Geometry,
+    /// World space, one per vertex; equal where vertices stand at one place.
+    pub rest_positions: &'a [Vec3],
+    pub pose: &'a Pose,
+    /// World-space corners.
+    pub bounds: [Vec3; 2],
+    pub environment: &'a Environment,
+    pub world: &'a World,
+    pub bvh: &'a Bvh,
+    pub watch: &'a dyn Watch,
+}
+
+/// The method on one scene: its clusters, elements and light.
+pub struct FaceClusters {
+    settings: Settings,
+    placement: Placement,
+    state: State,
+    queue: PairQueue,
+    report: Report,
+}
+
+/// Elements and their light; `capacity` entries each unless said otherwise.
+pub struct State {
+    capacity: u32,
+    /// Of the receiver's rule, then of the shooter's.
+    rules: Buffer<CubatureNode>,
+    pub elements: Buffer<FaceElement>,
+    /// Per element and rule node, metres.
+    nodes: Buffer<Vec3>,
+    /// Per element and radiosity function, W/m2.
+    unshot: Buffer<Vec3>,
+    next_unshot: Buffer<Vec3>,
+    /// Per element and irradiance function; a column a channel.
+    direct: Buffer<[[f32; 3]; 3]>,
+    indirect: Buffer<[[f32; 3]; 3]>,
+    /// Per element, irradiance function, channel and axis.
+    arriving: Buffer<i32>,
+    /// One entry.
+    pool: Buffer<PoolCounters>,
+    /// Of each pair of a step.
+    decisions: Buffer<u32>,
+    /// Per triangle: the elements of its front and back.
+    triangle_elements: Buffer<UVec2>,
+}
+
+impl FaceClusters {
+    /// Clusters all meshes and makes room for elements: everything but the light itself.
+    pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, FaceClusterError> {
+        let Settings { irradiance_basis, radiosity_basis, receiver_rule, .. } = settings;
+        if radiosity_basis.functions() > irradiance_basis.functions() {
+            return Err(FaceClusterError::Bases {
+                radiosity: rules::name(radiosity_basis),
+                irradiance: rules::name(irradiance_basis),
+            });
+        }
+        let needed = 2 * irradiance_basis.degree();
+        if receiver_rule.degree() < needed {
+            let (rule, degree, basis) =
+                (rules::name(receiver_rule), receiver_rule.degree(), rules::name(irradiance_basis));
+            return Err(FaceClusterError::Rule { rule, degree, basis, needed });
+        }
+        stage.watch.step("clusters", 0, 1)?;
+        let clock = std::time::Instant::now();
+        let placement = Placement::new(context, stage, settings.least_area)?;
+        let clustering = clock.elapsed();
+        stage.watch.step("clusters", 1, 1)?;
+        let state = State::new(context, &settings, &placement, stage.world.triangle_count)?;
+        let levels = 2 * placement.depth + 1;
+        let plan = PairQueuePlan { batch: BATCH, max_children: 4, levels, seeds: SEEDS as u32 };
+        let queue = PairQueue::new(context, "face-cluster", plan)?;
+        let report = Report::new(stage, &placement, clustering);
+        Ok(Self { settings, placement, state, queue, report })
+    }
+
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub fn placement(&self) -> &Placement {
+        &self.placement
+    }
+
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+}
+
+impl State {
+    fn new(
+        context: &Context,
+        settings: &Settings,
+        placement: &Placement,
+        triangle_count: u32,
+    ) -> Result<Self, FaceClusterError> {
+        let mut rules = settings.receiver_rule.nodes();
+        rules.extend(settings.shooter_rule.nodes());
+        let functions = settings.irradiance_basis.functions() as usize;
+        let radiosity_functions = settings.radiosity_basis.functions() as usize;
+        // The largest table of an element, and all of them, bytes.
+        let widest = (12 * rules.len()).max(36 * functions).max(size_of::<FaceElement>());
+        let all = size_of::<FaceElement>() + 12 * rules.len() + 24 * radiosity_functions + 108 * functions;
+        let allowed = context.limits().storage_buffer_bytes / widest as u64;
+        let wanted = placement.placed_clusters.min(settings.max_elements.into()).max(placement.instance_count.into());
+        let (needed, available) = (wanted * all as u64, context.available_bytes());
+        if wanted > allowed || needed > available {
+            return Err(FaceClusterError::OutOfMemory { needed, available: available.min(allowed * all as u64) });
+        }
+        let capacity = wanted as usize;
+        let buffer = |name: &str| format!("face-cluster/{name}");
+        Ok(Self {
+            capacity: wanted as u32,
+            rules: context.upload(&buffer("rules"), &rules)?,
+            elements: context.buffer(&buffer("elements"), capacity)?,
+            nodes: context.buffer(&buffer("nodes"), capacity * rules.len())?,
+            unshot: context.buffer(&buffer("unshot"), capacity * radiosity_functions)?,
+            next_unshot: context.buffer(&buffer("next unshot"), capacity * radiosity_functions)?,
+            direct: context.buffer(&buffer("direct"), capacity * functions)?,
+            indirect: context.buffer(&buffer("indirect"), capacity * functions)?,
+            arriving: context.buffer(&buffer("arriving"), capacity * functions * 9)?,
+            pool: context.buffer(&buffer("pool"), 1)?,
+            decisions: context.buffer(&buffer("decisions"), BATCH as usize)?,
+            triangle_elements: context.buffer(&buffer("triangle elements"), triangle_count as usize)?,
+        })
+    }
+
+    /// From emitters and the environment, per element and function; of leaves.
+    pub fn direct(&self) -> &Buffer<[[f32; 3]; 3]> {
+        &self.direct
+    }
+
+    /// Reflected at least once, per element and function; of leaves.
+    pub fn indirect(&self) -> &Buffer<[[f32; 3]; 3]> {
+        &self.indirect
+    }
+
+    /// Per triangle: the leaf elements of its front and back, u32::MAX where there is none.
+    pub fn triangle_elements(&self) -> &Buffer<UVec2> {
+        &self.triangle_elements
+    }
+}

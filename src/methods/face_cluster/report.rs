@@ -1,0 +1,99 @@
+//! What the method counted.
+
+use super::{Placement, Stage};
+use serde::Serialize;
+use std::fmt;
+use std::time::Duration;
+
+/// Of clustering and of the last solve.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Report {
+    pub triangles: u32,
+    pub trees: u32,
+    pub instances: u32,
+    /// On the host, all levels.
+    pub clusters: u64,
+    pub cluster_bytes: u64,
+    /// Deepest tree, levels.
+    pub tree_depth: u32,
+    pub clustering_seconds: f64,
+    pub elements: u32,
+    pub leaves: u32,
+    pub element_depth: u32,
+    /// Passes of light: punctual, direct and each bounce.
+    pub iterations: Vec<Iteration>,
+    /// Elements with all their tables.
+    pub solution_bytes: u64,
+    /// What arrives during an iteration; not part of the solution.
+    pub scratch_bytes: u64,
+    pub solve_seconds: f64,
+}
+
+/// One pass of light.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Iteration {
+    pub name: String,
+    /// Pairs looked at.
+    pub pairs: u64,
+    /// Pairs that passed light on.
+    pub transfers: u32,
+    pub rays: u32,
+    /// Elements after it.
+    pub elements: u32,
+    /// What is left to shoot, W/m2.
+    pub largest_unshot: f32,
+    pub seconds: f64,
+}
+
+impl Report {
+    pub(super) fn new(stage: &Stage<'_>, placement: &Placement, clustering: Duration) -> Self {
+        Self {
+            triangles: stage.geometry.triangle_count(),
+            trees: placement.trees.len() as u32,
+            instances: placement.instance_count,
+            clusters: placement.trees.iter().map(|tree| tree.clusters.len() as u64).sum(),
+            cluster_bytes: placement.model_bytes(),
+            tree_depth: placement.trees.iter().map(|tree| tree.depth).max().unwrap_or(0),
+            clustering_seconds: clustering.as_secs_f64(),
+            ..Self::default()
+        }
+    }
+
+    /// Pairs that passed light on, over all iterations.
+    pub fn transfers(&self) -> u64 {
+        self.iterations.iter().map(|i| u64::from(i.transfers)).sum()
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "face clusters: {} of {} triangles in {} trees ({} instances), {:.1} MB, {} levels, {:.2} s",
+            self.clusters,
+            self.triangles,
+            self.trees,
+            self.instances,
+            self.cluster_bytes as f64 / 1e6,
+            self.tree_depth,
+            self.clustering_seconds
+        )?;
+        for i in &self.iterations {
+            writeln!(
+                f,
+                "  {}: {} pairs, {} transfers, {} rays, {} elements, {:.3e} W/m2 unshot, {:.2} s",
+                i.name, i.pairs, i.transfers, i.rays, i.elements, i.largest_unshot, i.seconds
+            )?;
+        }
+        write!(
+            f,
+            "{} elements, {} of them leaves, {} levels; {:.2} MB of solution, {:.2} MB of scratch; {:.2} s",
+            self.elements,
+            self.leaves,
+            self.element_depth,
+            self.solution_bytes as f64 / 1e6,
+            self.scratch_bytes as f64 / 1e6,
+            self.solve_seconds
+        )
+    }
+}

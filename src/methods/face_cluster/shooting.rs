@@ -1,0 +1,216 @@
+//! Linkless shooting: Algorithm 1 of [Gobbetti2003], all receivers at once.
+//!
+//! [Gobbetti2003]: crate::methods::PAPERS
+
+use super::{FaceClusterError, FaceClusters, Stage, lights};
+use crate::gpu::shaders::methods::face_cluster as passes;
+use crate::gpu::shaders::types::{Light, PoolCounters};
+use crate::gpu::{Buffer, Context};
+use crate::scene::LightKind;
+use glam::Vec3;
+use std::f32::consts::PI;
+use std::time::Instant;
+
+/// `IS_LIGHT` of `lib/face_element.glsl`.
+pub(super) const IS_LIGHT: u32 = 1 << 31;
+/// Nearest a light is taken to stand to a surface, as a share of the scene's diagonal: bounds what can arrive.
+const NEAREST_LIGHT: f32 = 0.01;
+
+/// Where what arrives is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kept {
+    /// Reflected and forgotten.
+    No,
+    Direct,
+    Indirect,
+}
+
+/// What a pass of light shoots.
+#[derive(Clone, Copy)]
+pub(super) enum Shooters<'a> {
+    /// So many entries of a table.
+    Lights(&'a Buffer<Light>, u32),
+    Emission,
+    Unshot,
+}
+
+/// One pass of light through the scene.
+pub(super) struct LightPass<'a> {
+    pub name: String,
+    pub shooters: Shooters<'a>,
+    pub kept: Kept,
+    /// W, of a transfer's error.
+    pub threshold: f32,
+    /// W/m2, the most that can arrive anywhere.
+    pub most: f32,
+}
+
+impl FaceClusters {
+    /// Shoots emitted light and `bounces` reflections of it. After an interruption what has been shot so far can be
+    /// shown: call [`Self::locate`].
+    pub fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), FaceClusterError> {
+        let clock = Instant::now();
+        let self_threshold = self.settings.threshold;
+        self.report.iterations.clear();
+        self.start(context, stage)?;
+        let [low, high] = stage.bounds;
+        let diagonal = (high - low).length().max(f32::MIN_POSITIVE);
+        let distant = lights::distant_emitters(stage.environment, self.settings.environment_directions);
+        // An error is judged against the light it is an error of: a sun's power beside a candle's says nothing.
+        let threshold = |power: Vec3| self_threshold * power.max_element();
+        let across = PI * 0.25 * diagonal * diagonal;
+        let count = u64::from(bounces) + 3;
+
+        stage.watch.step("light", 0, count)?;
+        if stage.world.light_count > 0 {
+            let most = stage.pose.lights.iter().map(|light| match light.kind {
+                LightKind::Directional => light.intensity.max_element(),
+                _ => light.intensity.max_element() / (NEAREST_LIGHT * diagonal).powi(2),
+            });
+            let shooters = Shooters::Lights(&stage.world.lights, stage.world.light_count);
+            let (name, most) = ("punctual".to_owned(), most.sum());
+            let threshold = threshold(punctual_power(stage, across));
+            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::No, threshold, most })?;
+        }
+        stage.watch.step("light", 1, count)?;
+        if !distant.is_empty() {
+            let most = distant.iter().map(|light| light.intensity.max_element()).sum();
+            let table = context.upload("face-cluster/distant emitters", &distant)?;
+            let shooters = Shooters::Lights(&table, distant.len() as u32);
+            let name = "environment".to_owned();
+            let threshold = threshold(distant.iter().map(|light| across * light.intensity).sum());
+            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Direct, threshold, most })?;
+        }
+        stage.watch.step("light", 2, count)?;
+        let emitted = self.emit(context)?;
+        if emitted > 0.0 {
+            let (name, shooters) = ("direct".to_owned(), Shooters::Emission);
+            let threshold = threshold(self.placement.emitted_power);
+            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Direct, threshold, most: emitted })?;
+        }
+
+        let mut first = 0.0f32;
+        let threshold = if bounces > 0 { threshold(self.reflected_power(context)?) } else { 0.0 };
+        for bounce in 1..=bounces {
+            stage.watch.step("light", u64::from(bounce) + 2, count)?;
+            // What the last pass reflected is what this one shoots.
+            let unshot = self.report.iterations.last().map_or(0.0, |last| last.largest_unshot);
+            first = first.max(unshot);
+            if unshot <= self.settings.convergence * first {
+                break;
+            }
+            std::mem::swap(&mut self.state.unshot, &mut self.state.next_unshot);
+            let mut recorder = context.recorder("face-cluster")?;
+            recorder.fill(&self.state.next_unshot, 0);
+            recorder.submit()?;
+            let (name, shooters) = (format!("bounce {bounce}"), Shooters::Unshot);
+            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Indirect, threshold, most: unshot })?;
+        }
+        stage.watch.step("light", count, count)?;
+        self.locate(context, stage)?;
+        self.report.solve_seconds = clock.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Finds the leaf of every triangle, and counts.
+    pub fn locate(&mut self, context: &Context, stage: &Stage<'_>) -> Result<(), FaceClusterError> {
+        let (s, p) = (&self.state, &self.placement);
+        let mut recorder = context.recorder("face-cluster")?;
+        let pass = passes::Locate {
+            elements: &s.elements,
+            triangle_places: &p.places,
+            triangle_roots: &p.triangle_roots,
+            triangle_elements: &s.triangle_elements,
+            params: passes::LocateParams { triangle_count: stage.world.triangle_count },
+        };
+        recorder.dispatch(&pass, stage.world.triangle_count);
+        recorder.submit()?;
+        let counters = context.download(&s.pool)?[0];
+        let functions = u64::from(self.settings.irradiance_basis.functions());
+        let elements = u64::from(counters.element_count);
+        let of_element =
+            s.elements.size_bytes() + s.nodes.size_bytes() + s.unshot.size_bytes() + s.next_unshot.size_bytes();
+        self.report.elements = counters.element_count;
+        // Every split makes one leaf more.
+        self.report.leaves = (counters.element_count + p.instance_count) / 2;
+        self.report.element_depth = counters.deepest_level;
+        self.report.solution_bytes =
+            of_element / u64::from(s.capacity.max(1)) * elements + 2 * 36 * functions * elements;
+        self.report.scratch_bytes = 36 * functions * elements;
+        Ok(())
+    }
+
+    /// What the direct light left to shoot, W.
+    fn reflected_power(&self, context: &Context) -> Result<Vec3, FaceClusterError> {
+        let (s, roots) = (&self.state, self.placement.instance_count as usize);
+        let functions = self.settings.radiosity_basis.functions() as usize;
+        let elements = context.download_range(&s.elements, 0..roots)?;
+        let unshot = context.download_range(&s.next_unshot, 0..roots * functions)?;
+        Ok(elements.iter().zip(unshot.iter().step_by(functions)).map(|(element, &b)| element.area * b).sum())
+    }
+
+    /// The elements of all roots, dark.
+    fn start(&self, context: &Context, stage: &Stage<'_>) -> Result<(), FaceClusterError> {
+        let (s, p) = (&self.state, &self.placement);
+        let counters = PoolCounters {
+            element_count: p.instance_count,
+            made_count: p.instance_count,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        context.write(&s.pool, &[counters])?;
+        let mut recorder = context.recorder("face-cluster")?;
+        for buffer in [&s.unshot, &s.next_unshot] {
+            recorder.fill(buffer, 0);
+        }
+        recorder.fill(&s.direct, 0);
+        recorder.fill(&s.indirect, 0);
+        let pass = passes::MakeRoots {
+            clusters: &p.clusters,
+            cluster_skips: &p.skips,
+            instances: &p.instances,
+            tree_faces: &p.faces,
+            triangles: &stage.world.triangles,
+            positions: &stage.world.positions,
+            rules: &s.rules,
+            elements: &s.elements,
+            element_nodes: &s.nodes,
+            pool: &s.pool,
+            params: passes::MakeRootsParams { instance_count: p.instance_count },
+            constants: passes::MakeRootsConstants { rule_nodes: s.rules.len() as u32 },
+        };
+        recorder.dispatch(&pass, p.instance_count);
+        recorder.submit()?;
+        Ok(())
+    }
+
+    /// Makes emission the unshot light; returns the largest, W/m2.
+    fn emit(&self, context: &Context) -> Result<f32, FaceClusterError> {
+        let s = &self.state;
+        let mut counters = context.download(&s.pool)?[0];
+        counters.largest_unshot = 0;
+        context.write(&s.pool, &[counters])?;
+        let mut recorder = context.recorder("face-cluster")?;
+        let pass = passes::Emit {
+            elements: &s.elements,
+            unshot: &s.unshot,
+            pool: &s.pool,
+            params: passes::EmitParams {
+                element_count: counters.element_count,
+                radiosity_functions: self.settings.radiosity_basis.functions(),
+            },
+        };
+        recorder.dispatch(&pass, counters.element_count);
+        recorder.submit()?;
+        Ok(f32::from_bits(context.download(&s.pool)?[0].largest_unshot))
+    }
+}
+
+/// Of all punctual lights, W; `across` is what a directional light sees of the scene, m2.
+fn punctual_power(stage: &Stage<'_>, across: f32) -> Vec3 {
+    let power = stage.pose.lights.iter().map(|light| match light.kind {
+        LightKind::Point => 4.0 * PI * light.intensity,
+        LightKind::Spot { outer_angle, .. } => 2.0 * PI * (1.0 - outer_angle.cos()) * light.intensity,
+        LightKind::Directional => across * light.intensity,
+    });
+    power.sum()
+}

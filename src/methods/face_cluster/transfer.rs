@@ -1,0 +1,286 @@
+//! One pass of light: pairs refined and transported, what arrived pushed to the leaves, reflected, and pulled up.
+
+use super::report::Iteration;
+use super::shooting::{IS_LIGHT, Kept, LightPass, Shooters};
+use super::{FaceClusterError, FaceClusters, SEEDS, Stage, Visibility};
+use crate::gpu::shaders::methods::face_cluster as passes;
+use crate::gpu::shaders::types::{PairCounters, PoolCounters};
+use crate::gpu::{Context, Recorder};
+use glam::UVec2;
+use std::time::Instant;
+
+/// Whole units of the most that can arrive: five bits of room to the largest i32.
+const MOST_UNITS: f32 = (1 << 26) as f32;
+/// How far rays to lights start off their surface, as a share of the scene's diagonal.
+const RAY_OFFSET: f32 = 1e-5;
+
+impl FaceClusters {
+    /// Shoots, settles and pulls.
+    pub(super) fn shoot(
+        &mut self,
+        context: &Context,
+        stage: &Stage<'_>,
+        pass: &LightPass<'_>,
+    ) -> Result<(), FaceClusterError> {
+        let clock = Instant::now();
+        let mut counters = context.download(&self.state.pool)?[0];
+        (counters.transfers, counters.rays, counters.largest_unshot) = (0, 0, 0);
+        context.write(&self.state.pool, &[counters])?;
+        let mut recorder = context.recorder("face-cluster")?;
+        recorder.fill(&self.state.arriving, 0);
+        recorder.submit()?;
+
+        let units = MOST_UNITS / pass.most.max(f32::MIN_POSITIVE);
+        let mut pairs = 0;
+        for seeds in self.seeds(pass.shooters).chunks(SEEDS) {
+            pairs += self.refine(context, stage, pass, units, seeds)?;
+        }
+        let counters = context.download(&self.state.pool)?[0];
+        self.settle(context, pass.kept, 1.0 / units, &counters)?;
+
+        let counters = context.download(&self.state.pool)?[0];
+        self.report.iterations.push(Iteration {
+            name: pass.name.clone(),
+            pairs,
+            transfers: counters.transfers,
+            rays: counters.rays,
+            elements: counters.element_count,
+            largest_unshot: f32::from_bits(counters.largest_unshot),
+            seconds: clock.elapsed().as_secs_f64(),
+        });
+        Ok(())
+    }
+
+    /// Every root with every shooter.                                                    [Gobbetti2003 Alg. 1]
+    fn seeds(&self, shooters: Shooters<'_>) -> Vec<UVec2> {
+        let roots = self.placement.instance_count;
+        let shooters: Vec<u32> = match shooters {
+            Shooters::Lights(_, count) => (0..count).map(|light| light | IS_LIGHT).collect(),
+            Shooters::Emission | Shooters::Unshot => (0..roots).collect(),
+        };
+        (0..roots).flat_map(|root| shooters.iter().map(move |&shooter| UVec2::new(root, shooter))).collect()
+    }
+
+    /// Splits and transports until nothing is left; returns the number of pairs looked at.
+    fn refine(
+        &self,
+        context: &Context,
+        stage: &Stage<'_>,
+        pass: &LightPass<'_>,
+        units: f32,
+        seeds: &[UVec2],
+    ) -> Result<u64, FaceClusterError> {
+        let (s, queue) = (&self.state, &self.queue);
+        let is_emission = matches!(pass.shooters, Shooters::Emission);
+        let step = |recorder: &mut Recorder<'_>| {
+            self.decide(recorder, stage, pass, units);
+            self.grow(recorder, stage, is_emission);
+            let expand = passes::Expand {
+                taken_pairs: &queue.taken,
+                decisions: &s.decisions,
+                elements: &s.elements,
+                counters: &queue.counters,
+                pair_stack: &queue.stack,
+                pool: &s.pool,
+            };
+            recorder.dispatch_indirect(&expand, &queue.groups, 0);
+        };
+        // Between submissions: whether the elements still have room, and the work is still wanted.
+        let look = |counters: &PairCounters| -> Result<(), FaceClusterError> {
+            if context.download(&s.pool)?[0].is_full != 0 {
+                return Err(FaceClusterError::PoolFull { capacity: s.capacity, threshold: self.settings.threshold });
+            }
+            let seen = u64::from(counters.visited);
+            Ok(stage.watch.step(&pass.name, seen, seen + u64::from(counters.top))?)
+        };
+        let mut outcome = Ok(());
+        let counters = queue.refine_while(context, "face-cluster", seeds, step, |counters| {
+            outcome = look(counters);
+            outcome.is_ok()
+        })?;
+        outcome?;
+        look(&counters)?;
+        Ok(counters.visited.into())
+    }
+
+    /// Transports the pairs of a step, or decides how to split them.                       [Gobbetti2003 3.3]
+    fn decide(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, units: f32) {
+        let (s, p, queue, world) = (&self.state, &self.placement, &self.queue, stage.world);
+        let receiver_nodes = self.settings.receiver_rule.nodes().len() as u32;
+        let shooter_nodes = self.settings.shooter_rule.nodes().len() as u32;
+        let irradiance_functions = self.settings.irradiance_basis.functions();
+        let radiosity_functions = self.settings.radiosity_basis.functions();
+        let clusters_block = self.settings.visibility == Visibility::Clusters;
+        if let Shooters::Lights(lights, _) = pass.shooters {
+            let diagonal = (stage.bounds[1] - stage.bounds[0]).length().max(f32::MIN_POSITIVE);
+            let pass = passes::TransportLights {
+                bvh_nodes: stage.bvh.nodes(),
+                bvh_triangles: stage.bvh.triangles(),
+                triangles: &world.triangles,
+                triangle_materials: &world.triangle_materials,
+                attributes: &world.attributes,
+                materials: &world.materials,
+                triangle_places: &p.places,
+                elements: &s.elements,
+                element_nodes: &s.nodes,
+                rules: &s.rules,
+                cluster_skips: &p.skips,
+                clusters: &p.clusters,
+                instances: &p.instances,
+                tree_faces: &p.faces,
+                positions: &world.positions,
+                arriving: &s.arriving,
+                pool: &s.pool,
+                textures: &world.textures,
+                counters: &queue.counters,
+                taken_pairs: &queue.taken,
+                lights,
+                decisions: &s.decisions,
+                params: passes::TransportLightsParams {
+                    threshold: pass.threshold,
+                    units,
+                    far: 2.0 * diagonal,
+                    ray_offset: RAY_OFFSET * diagonal,
+                },
+                constants: passes::TransportLightsConstants {
+                    receiver_nodes,
+                    shooter_nodes,
+                    irradiance_functions,
+                    alpha_test: world.has_holes,
+                    clusters_block,
+                },
+            };
+            recorder.dispatch_indirect(&pass, &queue.groups, 0);
+        } else {
+            let pass = passes::Transport {
+                bvh_nodes: stage.bvh.nodes(),
+                bvh_triangles: stage.bvh.triangles(),
+                triangles: &world.triangles,
+                triangle_materials: &world.triangle_materials,
+                attributes: &world.attributes,
+                materials: &world.materials,
+                triangle_places: &p.places,
+                elements: &s.elements,
+                element_nodes: &s.nodes,
+                rules: &s.rules,
+                cluster_skips: &p.skips,
+                clusters: &p.clusters,
+                instances: &p.instances,
+                tree_faces: &p.faces,
+                positions: &world.positions,
+                arriving: &s.arriving,
+                pool: &s.pool,
+                textures: &world.textures,
+                counters: &queue.counters,
+                taken_pairs: &queue.taken,
+                unshot: &s.unshot,
+                decisions: &s.decisions,
+                params: passes::TransportParams {
+                    threshold: pass.threshold,
+                    units,
+                    rays_per_node: self.settings.rays_per_node,
+                },
+                constants: passes::TransportConstants {
+                    receiver_nodes,
+                    shooter_nodes,
+                    irradiance_functions,
+                    radiosity_functions,
+                    alpha_test: world.has_holes,
+                    clusters_block,
+                },
+            };
+            recorder.dispatch_indirect(&pass, &queue.groups, 0);
+        }
+    }
+
+    /// Makes the children that a step's decisions ask for.                                  [Gobbetti2003 3.3.4]
+    fn grow(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, is_emission: bool) {
+        let (s, p, queue, world) = (&self.state, &self.placement, &self.queue, stage.world);
+        let capacity = s.capacity;
+        let claim = passes::Grow {
+            counters: &queue.counters,
+            taken_pairs: &queue.taken,
+            decisions: &s.decisions,
+            cluster_skips: &p.skips,
+            elements: &s.elements,
+            pool: &s.pool,
+            params: passes::GrowParams { capacity },
+        };
+        recorder.dispatch_indirect(&claim, &queue.groups, 0);
+        let make = passes::MakeChildren {
+            clusters: &p.clusters,
+            cluster_skips: &p.skips,
+            instances: &p.instances,
+            tree_faces: &p.faces,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            rules: &s.rules,
+            elements: &s.elements,
+            element_nodes: &s.nodes,
+            pool: &s.pool,
+            counters: &queue.counters,
+            params: passes::MakeChildrenParams { capacity },
+            constants: passes::MakeChildrenConstants { rule_nodes: s.rules.len() as u32 },
+        };
+        recorder.dispatch_indirect(&make, &queue.groups, 0);
+        let inherit = passes::Inherit {
+            counters: &queue.counters,
+            elements: &s.elements,
+            pool: &s.pool,
+            unshot: &s.unshot,
+            next_unshot: &s.next_unshot,
+            direct_irradiance: &s.direct,
+            indirect_irradiance: &s.indirect,
+            arriving: &s.arriving,
+            params: passes::InheritParams { capacity, is_emission: u32::from(is_emission) },
+            constants: passes::InheritConstants {
+                irradiance_functions: self.settings.irradiance_basis.functions(),
+                radiosity_functions: self.settings.radiosity_basis.functions(),
+            },
+        };
+        recorder.dispatch_indirect(&inherit, &queue.groups, 0);
+    }
+
+    /// Pushes down to the leaves, reflects, and pulls up.                                   [Gobbetti2003 3.3.4]
+    fn settle(
+        &self,
+        context: &Context,
+        kept: Kept,
+        inverse_units: f32,
+        counters: &PoolCounters,
+    ) -> Result<(), FaceClusterError> {
+        let s = &self.state;
+        let irradiance_functions = self.settings.irradiance_basis.functions();
+        let radiosity_functions = self.settings.radiosity_basis.functions();
+        let element_count = counters.element_count;
+        let mut recorder = context.recorder("face-cluster")?;
+        for level in 0..=counters.deepest_level {
+            let pass = passes::Settle {
+                elements: &s.elements,
+                arriving: &s.arriving,
+                irradiance: if kept == Kept::Indirect { &s.indirect } else { &s.direct },
+                next_unshot: &s.next_unshot,
+                params: passes::SettleParams {
+                    element_count,
+                    level,
+                    inverse_units,
+                    is_kept: u32::from(kept != Kept::No),
+                },
+                constants: passes::SettleConstants { irradiance_functions, radiosity_functions },
+            };
+            recorder.dispatch(&pass, element_count * irradiance_functions);
+        }
+        for level in (0..=counters.deepest_level).rev() {
+            let pass = passes::Pull {
+                elements: &s.elements,
+                next_unshot: &s.next_unshot,
+                pool: &s.pool,
+                params: passes::PullParams { element_count, level },
+                constants: passes::PullConstants { radiosity_functions },
+            };
+            recorder.dispatch(&pass, element_count);
+        }
+        recorder.submit()?;
+        Ok(())
+    }
+}

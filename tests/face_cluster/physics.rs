@@ -1,0 +1,207 @@
+//! Closed forms and conservation laws.
+
+use crate::common::TestContext;
+use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::fixture::{Fixture, builtin_scene, leaves, received};
+use glam::Vec3;
+use linklight::methods::face_cluster::rules::{Basis, Rule};
+use linklight::methods::face_cluster::{FaceClusterError, Settings};
+use linklight::scene::environment::Environment;
+use linklight::scene::{LightKind, Material};
+use std::f32::consts::PI;
+
+fn one_sided(albedo: f32) -> Material {
+    Material { double_sided: false, ..lambert(Vec3::splat(albedo)) }
+}
+
+/// Flat scenes on a constant basis: the form factors of classical hierarchical radiosity, and errors that fall with the
+/// threshold.                                                                              [common ground]
+#[test]
+fn form_factors_of_plates() {
+    let context = TestContext::new();
+    for (name, exact) in [("parallel-plates", 0.199_825), ("perpendicular-plates", 0.200_044)] {
+        let fixture = Fixture::new(&context, builtin_scene(name), Some(1.0 / 32.0));
+        let mut transfers = Vec::new();
+        for basis in [Basis::Constant, Basis::Linear, Basis::Quadratic] {
+            let (mut errors, mut finest) = (Vec::new(), 0);
+            for threshold in [1e-3, 1e-5] {
+                let settings = Settings { threshold, irradiance_basis: basis, ..Settings::default() };
+                let method = fixture.solve(&context, settings, 0);
+                let (power, area) = received(&leaves(&context, &method), |e| e.albedo.x > 0.5);
+                assert!((area - 1.0).abs() < 1e-4, "the receiver is a unit square, {area}");
+                let error = (power / area / exact - 1.0).abs();
+                let count = method.report().transfers();
+                println!(
+                    "{name}, {basis:?}, threshold {threshold:e}: {:.6}, error {:.4} %, {count} transfers",
+                    power / area,
+                    100.0 * error
+                );
+                errors.push(error);
+                finest = count;
+            }
+            assert!(errors[1] < 4e-3 && errors[1] < errors[0], "{name}, {basis:?}: {errors:?}");
+            transfers.push(finest);
+        }
+        // More functions say more with less.                                           [Gobbetti2003 Fig. 4]
+        assert!(transfers.is_sorted_by(|a, b| a > b), "{name}: {transfers:?}");
+    }
+}
+
+/// A closed room of albedo 1/2 that emits 1 everywhere: after k bounces the radiance is 2 - 2^-k.   [common ground]
+#[test]
+fn the_furnace_gains_half_of_each_bounce() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("furnace"), Some(0.5));
+    let settings = Settings { convergence: 0.0, ..Settings::default() };
+    for bounces in [0, 3u32] {
+        let method = fixture.solve(&context, settings, bounces);
+        let leaves = leaves(&context, &method);
+        let (power, area) = received(&leaves, |_| true);
+        let expected = 2.0 * f64::from(PI) * (1.0 - 0.5f64.powi(bounces as i32 + 1));
+        let error = power / area / expected - 1.0;
+        let worst =
+            leaves.iter().map(|l| (f64::from(l.direct.x + l.indirect.x) / expected - 1.0).abs()).fold(0.0, f64::max);
+        println!("furnace, {bounces} bounces: mean off by {:.3} %, a leaf by {:.3} %", 100.0 * error, 100.0 * worst);
+        assert!(error.abs() < 1e-2, "{bounces} bounces: {error}");
+        assert!(worst < 0.2, "{bounces} bounces: {worst}");
+    }
+}
+
+/// A point light over a plane: I cos / r^2 in the mean of every leaf, seen in what it reflects onto a ceiling.
+#[test]
+fn punctual_light_is_reflected() {
+    let context = TestContext::new();
+    let plane = parallelogram(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 32, 0);
+    let roof = parallelogram(Vec3::new(-1.0, 1.0, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0, 32, 1);
+    let lamp = (light(LightKind::Point, 3.0), Vec3::new(0.0, 0.5, 0.0), Vec3::NEG_Y);
+    let fixture =
+        Fixture::new(&context, scene(vec![one_sided(1.0), one_sided(0.25)], vec![plane, roof], &[lamp]), None);
+    let method = fixture.solve(&context, Settings { threshold: 1e-5, ..Settings::default() }, 1);
+    let leaves = leaves(&context, &method);
+    assert!(leaves.iter().all(|l| l.direct == Vec3::ZERO), "punctual light is shown per pixel");
+    // By brute force: 3 cos / r^2 on the floor, cos cos / (pi r^2) to the roof's middle.
+    let cells = 200;
+    let mut expected = 0.0f64;
+    for i in 0..cells {
+        for j in 0..cells {
+            let at = |k: i32| -1.0 + 2.0 * (f64::from(k) + 0.5) / f64::from(cells);
+            let (x, z) = (at(i), at(j));
+            let (to_lamp, to_roof) = (x * x + z * z + 0.25, x * x + z * z + 1.0);
+            let radiosity = 3.0 * 0.5 / to_lamp.powf(1.5);
+            expected += radiosity / (std::f64::consts::PI * to_roof * to_roof) * (2.0 / f64::from(cells)).powi(2);
+        }
+    }
+    let middle = leaves.iter().filter(|l| l.element.albedo.x < 0.5).min_by(|a, b| {
+        let d = |l: &crate::fixture::Leaf| l.element.center.with_y(0.0).length();
+        d(a).total_cmp(&d(b))
+    });
+    let found = f64::from(middle.unwrap().indirect.x);
+    println!("roof above the lamp: {found}, expected {expected}");
+    assert!((found / expected - 1.0).abs() < 0.03, "{found}, expected {expected}");
+}
+
+/// An open plane under an even sky receives pi L.
+#[test]
+fn an_even_sky_gives_pi_times_its_radiance() {
+    let context = TestContext::new();
+    let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 4, 0);
+    let sky = Environment::Constant(Vec3::new(0.5, 1.0, 2.0));
+    let fixture = Fixture::lit(&context, scene(vec![one_sided(0.5)], vec![plane], &[]), None, sky);
+    let method = fixture.solve(&context, Settings { environment_directions: 512, ..Settings::default() }, 0);
+    for leaf in leaves(&context, &method) {
+        let error = (leaf.direct / (PI * Vec3::new(0.5, 1.0, 2.0)) - Vec3::ONE).abs().max_element();
+        assert!(error < 1e-2, "{}", leaf.direct);
+    }
+}
+
+/// Nothing is made from nothing: all that the box receives after all bounces is what its light sends, and again what is
+/// reflected of it; the rest leaves through the open side.
+#[test]
+fn energy_of_the_cornell_box_is_emitted_or_reflected() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.05));
+    let settings = Settings { threshold: 1e-4, ..Settings::default() };
+    let method = fixture.solve(&context, settings, 8);
+    let leaves = leaves(&context, &method);
+    let emitted = f64::from(method.placement().emitted_power.x);
+    let (mut received, mut absorbed) = (0.0f64, 0.0f64);
+    for leaf in &leaves {
+        let power = f64::from(leaf.element.area * (leaf.direct.x + leaf.indirect.x));
+        received += power;
+        absorbed += power * f64::from(1.0 - leaf.element.albedo.x);
+    }
+    println!("{}", method.report());
+    println!("cornell box: {emitted:.3} W emitted, {received:.3} W received, {absorbed:.3} W absorbed");
+    assert!(absorbed < 1.01 * emitted, "{absorbed} W absorbed of {emitted} W");
+    assert!(absorbed > 0.5 * emitted, "{absorbed} W absorbed of {emitted} W");
+}
+
+/// Two rooms and a closed door: the dark one is exactly dark.
+#[test]
+fn no_light_passes_a_closed_door() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("two-rooms"), Some(0.4));
+    let method = fixture.solve(&context, Settings { threshold: 1e-4, ..Settings::default() }, 3);
+    let all = leaves(&context, &method);
+    let (power, _) = received(&all, |_| true);
+    assert!(power > 0.0);
+    // The rooms lie side by side along x.
+    let middle = 0.5 * (fixture.bounds[0].x + fixture.bounds[1].x);
+    let side = |e: &linklight::gpu::shaders::types::FaceElement| e.center.x > middle + 0.2;
+    let (right, _) = received(&all, side);
+    let (left, _) = received(&all, |e| e.center.x < middle - 0.2);
+    println!("two rooms: {left} W and {right} W");
+    assert!(left.min(right) < 1e-6 * left.max(right), "{left} W and {right} W");
+}
+
+/// The same bits whatever order the device works in.
+#[test]
+fn solutions_are_the_same_each_time() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.1));
+    let settings = Settings { threshold: 1e-3, ..Settings::default() };
+    let solve = || {
+        let method = fixture.solve(&context, settings, 2);
+        let mut leaves: Vec<_> = leaves(&context, &method)
+            .iter()
+            .map(|l| {
+                (
+                    l.element.instance,
+                    l.element.cluster,
+                    l.direct.to_array().map(f32::to_bits),
+                    l.indirect.to_array().map(f32::to_bits),
+                )
+            })
+            .collect();
+        leaves.sort_unstable();
+        leaves
+    };
+    let first = solve();
+    assert!(first.len() > 50, "{} leaves", first.len());
+    assert!(solve() == first);
+}
+
+/// Settings that cannot work say so, and what to do.
+#[test]
+fn what_cannot_be_solved_is_refused() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.1));
+    let refused = |settings: Settings| match fixture.try_solve(&context, settings, 1) {
+        Err(error) => error,
+        Ok(method) => panic!("solved with {} elements", method.report().elements),
+    };
+    let error = refused(Settings { radiosity_basis: Basis::Quadratic, ..Settings::default() });
+    assert!(matches!(error, FaceClusterError::Bases { .. }), "{error}");
+    assert!(error.to_string().contains("radiosity_basis=quadratic"), "{error}");
+    let error = refused(Settings { irradiance_basis: Basis::Cubic, ..Settings::default() });
+    assert!(matches!(error, FaceClusterError::Rule { .. }), "{error}");
+    let error = refused(Settings { max_elements: 64, threshold: 1e-5, ..Settings::default() });
+    assert!(matches!(error, FaceClusterError::PoolFull { .. }), "{error}");
+    let cubic = Settings {
+        irradiance_basis: Basis::Cubic,
+        receiver_rule: Rule::Sixteen,
+        threshold: 1e-3,
+        ..Settings::default()
+    };
+    assert!(fixture.solve(&context, cubic, 1).report().leaves > 10);
+}
