@@ -99,7 +99,7 @@ fn soup(count: u32) -> Mesh {
 /// A strip that a greedy contraction could peel from one end.
 fn strip(count: u32) -> Mesh {
     let positions = (0..count + 2).map(|i| Vec3::new(1.01f32.powi(i as i32 / 2), (i % 2) as f32, 0.0)).collect();
-    let triangle = |i: u32| if i % 2 == 0 { [i, i + 2, i + 1] } else { [i, i + 1, i + 2] };
+    let triangle = |i: u32| if i.is_multiple_of(2) { [i, i + 2, i + 1] } else { [i, i + 1, i + 2] };
     Mesh::new(positions, (0..count).map(triangle).collect())
 }
 
@@ -139,7 +139,7 @@ fn fault(mesh: &Mesh, tree: &ClusterTree) -> Option<String> {
         for &face in own {
             for v in mesh.triangles[face as usize] {
                 let p = axes(cluster).transpose() * (mesh.positions[v as usize] - cluster.center);
-                if !p.abs().cmple(Vec3::from(cluster.half_extent) + 1e-6).all() {
+                if !p.abs().cmple(cluster.half_extent + 1e-6).all() {
                     return Some(format!("cluster {i}: vertex {v} at {p} of a box of {}", cluster.half_extent));
                 }
             }
