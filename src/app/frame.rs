@@ -7,7 +7,7 @@ use super::on_texels::TexelsShown;
 use super::render::{LightParts, RenderRequest};
 use super::stage::Stage;
 use crate::display::direct::Sample;
-use crate::display::final_gather::{FinalGather, Gathered};
+use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::irradiance_vector;
 use crate::display::shadow_maps::ShadowMaps;
@@ -263,6 +263,7 @@ impl Gather {
         method: &dyn OnElements,
     ) -> Result<Self, AppError> {
         let settings = request.final_gather_settings()?;
+        check_visibility(request, settings.gather_visibility, false)?;
         let positions = context.download(&stage.world.positions)?;
         let back_elements = &method.elements().topology.back_elements;
         let options = settings.tree_options();
@@ -306,6 +307,18 @@ impl Gather {
         };
         gather_samples(context, request, &self.display, gathered, film, watch)
     }
+}
+
+/// Refuses a gather by maps where there are none.
+pub(super) fn check_visibility(request: &RenderRequest, asked: Visibility, has_maps: bool) -> Result<(), AppError> {
+    if asked == Visibility::Maps && !has_maps {
+        return Err(AppError::Usage(format!(
+            "gather_visibility=maps needs surface shadow maps, and {} has none here; use rays, or --method \
+             surface-shadow-maps with visibility=maps",
+            request.method.key
+        )));
+    }
+    Ok(())
 }
 
 /// Gathers a solution sample by sample: each is a submission, so that the user can interrupt between them.

@@ -2,7 +2,7 @@
 
 use super::AppError;
 use super::cli::Display;
-use super::frame::gather_samples;
+use super::frame::{check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::final_gather::{FinalGather, Gathered};
@@ -56,6 +56,7 @@ impl TexelsShown {
             _ => {
                 let size = [request.width, request.height];
                 let settings = request.final_gather_settings()?;
+                check_visibility(request, settings.gather_visibility, method.maps.is_some())?;
                 Shown::FinalGather(FinalGather::new(context, size, settings, request.tone, request.seed)?)
             }
         };

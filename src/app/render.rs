@@ -379,7 +379,10 @@ mod tests {
 
     #[test]
     fn contradictions_are_refused() {
-        let cases: [(&[&str], &str); 8] = [
+        let cases: [(&[&str], &str); 11] = [
+            (&["--method", "surface-shadow-maps", "--display", "vertex"], "texels, not vertices"),
+            (&["--display", "lightmap"], "vertices, not an atlas"),
+            (&["--lightmap", "a.exr"], "needs --method surface-shadow-maps"),
             (&["--method", "path-tracing", "--display", "vertex"], "pixels of its own"),
             (&["--indirect-only", "--bounces", "0"], "at least 1 bounce"),
             (&["--indirect-only", "--direct-only"], "cannot be used with"),
