@@ -4,7 +4,7 @@ use super::AppError;
 use super::cli::{Channel, Display};
 use super::on_elements::OnElements;
 use super::on_texels::TexelsShown;
-use super::render::{LightParts, RenderRequest};
+use super::render::{LightParts, RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::direct::Sample;
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
@@ -23,6 +23,7 @@ use crate::stages::film::Film;
 use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
 use glam::UVec2;
+use std::path::Path;
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {
@@ -75,7 +76,11 @@ fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibi
 }
 
 /// As [`explicit_stage`], for face clusters.
-fn cluster_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> face_cluster::Stage<'a> {
+fn cluster_stage<'a>(
+    stage: &'a Stage,
+    cluster_cache: Option<&'a Path>,
+    watch: &'a dyn Watch,
+) -> face_cluster::Stage<'a> {
     face_cluster::Stage {
         scene: &stage.scene,
         geometry: &stage.geometry,
@@ -85,6 +90,7 @@ fn cluster_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> face_cluster::St
         environment: &stage.environment,
         world: &stage.world,
         bvh: &stage.bvh,
+        cluster_cache,
         watch,
     }
 }
@@ -134,7 +140,9 @@ impl Method {
                 Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
             }
             "face-cluster" => {
-                let method = FaceClusters::prepare(context, &cluster_stage(stage, watch), request.settings()?);
+                let cache = cache_folder().map(|folder| folder.join("clusters"));
+                let stage_of = cluster_stage(stage, cache.as_deref(), watch);
+                let method = FaceClusters::prepare(context, &stage_of, request.settings()?);
                 let method = method.map_err(AppError::failed)?;
                 let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
                 let g_buffer = GBuffer::new(context, request.width, request.height)?;
@@ -239,7 +247,7 @@ impl Method {
             }
             Self::FaceClusters(shown) => {
                 let FaceClustersShown { method, shadow_maps, g_buffer } = &mut **shown;
-                method.solve(context, &cluster_stage(stage, watch), request.bounces).map_err(AppError::failed)?;
+                method.solve(context, &cluster_stage(stage, None, watch), request.bounces).map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
                 let colors = method.colors(context).map_err(AppError::failed)?;
                 let mut recorder = context.recorder("frame")?;

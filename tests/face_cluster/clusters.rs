@@ -4,7 +4,7 @@ use crate::common::Random;
 use glam::Vec3;
 use linklight::gpu::shaders::types::FaceCluster;
 use linklight::stages::clusters::{
-    self, ClusterTree, MAX_DEPTH, MeshFaces, axes, face_count, is_convex, least_projected_area, most_projected_area,
+    ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, is_convex, least_projected_area, most_projected_area,
 };
 
 /// A mesh of one material.
@@ -272,5 +272,36 @@ fn no_faces_and_bad_faces_make_a_tree() {
     assert_eq!((tree.clusters.len(), tree.clusters[0].area), (5, 0.0));
     assert!(tree.clusters.iter().all(|c| c.center.is_finite() && axes(c).z_axis.is_finite()));
     assert_eq!(size_of::<FaceCluster>(), 108, "the paper's cluster takes 110 bytes");
-    let _ = clusters::MAX_DEPTH;
+}
+
+/// A tree is read back as it was; a damaged or foreign file is made anew, and a folder that cannot be is no obstacle.
+#[test]
+fn trees_are_kept_between_runs() {
+    let mesh = sheet(50, |x, y| 0.1 * (5.0 * x).sin() * y);
+    let dark = vec![Vec3::ZERO; mesh.triangles.len()];
+    let faces = mesh.faces(&dark);
+    assert!(mesh.triangles.len() >= cache::LEAST_FACES);
+    let folder = tempfile::tempdir().unwrap();
+    let built = cache::tree(&faces, Some(folder.path()));
+    let path = cache::path_of(folder.path(), &faces);
+    let whole = std::fs::read(&path).unwrap();
+    assert!(cache::tree(&faces, Some(folder.path())) == built);
+
+    // What is read is what is in the file: another tree, whole, is believed; a changed byte is not.
+    for damage in [0, 9, whole.len() / 2, whole.len() - 1] {
+        let mut bytes = whole.clone();
+        bytes[damage] ^= 1;
+        std::fs::write(&path, bytes).unwrap();
+        assert!(cache::tree(&faces, Some(folder.path())) == built, "byte {damage}");
+        assert_eq!(std::fs::read(&path).unwrap(), whole, "byte {damage} was repaired");
+    }
+    std::fs::write(&path, &whole[..whole.len() / 3]).unwrap();
+    assert!(cache::tree(&faces, Some(folder.path())) == built);
+    assert!(cache::tree(&faces, Some(&path.join("below a file"))) == built);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "nothing else is left behind");
+
+    // Another colour is another mesh.
+    let mut other = sheet(50, |x, y| 0.1 * (5.0 * x).sin() * y);
+    other.albedo[7] = Vec3::X;
+    assert_ne!(cache::key(&other.faces(&dark)), cache::key(&faces));
 }

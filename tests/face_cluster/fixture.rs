@@ -62,6 +62,7 @@ impl Fixture {
             environment: &self.environment,
             world: &self.world,
             bvh: &self.bvh,
+            cluster_cache: None,
             watch: &Unwatched,
         }
     }

@@ -5,9 +5,10 @@ use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene, leaves, received};
 use glam::Vec3;
 use linklight::methods::face_cluster::rules::{Basis, Rule};
-use linklight::methods::face_cluster::{FaceClusterError, Settings};
+use linklight::methods::face_cluster::{FaceClusterError, FaceClusters, Settings, Stage, Visibility};
 use linklight::scene::environment::Environment;
 use linklight::scene::{LightKind, Material};
+use linklight::stages::work::{Interrupted, Watch};
 use std::f32::consts::PI;
 
 fn one_sided(albedo: f32) -> Material {
@@ -204,4 +205,44 @@ fn what_cannot_be_solved_is_refused() {
         ..Settings::default()
     };
     assert!(fixture.solve(&context, cubic, 1).report().leaves > 10);
+}
+
+/// Wants no more once reflected light is on its way.
+struct Impatient;
+
+impl Watch for Impatient {
+    fn step(&self, task: &str, _: u64, _: u64) -> Result<(), Interrupted> {
+        if task == "bounce 2" { Err(Interrupted) } else { Ok(()) }
+    }
+}
+
+/// What was shot before an interruption is there to be shown.
+#[test]
+fn an_interrupted_solution_can_be_shown() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.1));
+    let settings = Settings { threshold: 1e-3, ..Settings::default() };
+    let once = received(&leaves(&context, &fixture.solve(&context, settings, 1)), |_| true).0;
+    let stage = Stage { watch: &Impatient, ..fixture.stage() };
+    let mut method = FaceClusters::prepare(&context, &stage, settings).unwrap();
+    let error = method.solve(&context, &stage, 4).unwrap_err();
+    assert!(matches!(error, FaceClusterError::Interrupted(_)), "{error}");
+    method.locate(&context, &stage).unwrap();
+    let (power, area) = received(&leaves(&context, &method), |_| true);
+    println!("after an interruption {power} W, with one bounce {once} W");
+    assert!((power / once - 1.0).abs() < 5e-3, "{power} W, {once} W with one bounce, on {area} m2");
+}
+
+/// Clusters block as their faces do, nearly.
+#[test]
+fn clusters_block_about_as_rays_do() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.1));
+    let power = |visibility| {
+        let method = fixture.solve(&context, Settings { threshold: 1e-4, visibility, ..Settings::default() }, 2);
+        received(&leaves(&context, &method), |_| true).0
+    };
+    let (rays, clusters) = (power(Visibility::Rays), power(Visibility::Clusters));
+    println!("cornell box: {rays} W received by rays, {clusters} W by clusters");
+    assert!((clusters / rays - 1.0).abs() < 0.03, "{clusters} W by clusters, {rays} W by rays");
 }

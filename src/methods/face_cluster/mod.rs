@@ -54,6 +54,7 @@ use crate::stages::world::World;
 use glam::{UVec2, Vec3};
 use rules::{Basis, Rule};
 use showing::{Shading, Shown};
+use std::path::Path;
 
 /// Pairs of a step of refinement.
 const BATCH: u32 = 1 << 14;
@@ -145,6 +146,8 @@ pub struct Stage<'a> {
     pub environment: &'a Environment,
     pub world: &'a World,
     pub bvh: &'a Bvh,
+    /// Folder that keeps cluster trees between runs.
+    pub cluster_cache: Option<&'a Path>,
     pub watch: &'a dyn Watch,
 }
 

@@ -10,7 +10,7 @@ use crate::gpu::shaders::types::{ClusterInstance, FaceCluster};
 use crate::gpu::{Buffer, Context};
 use crate::scene::geometry::Part;
 use crate::scene::surfaces::Surfaces;
-use crate::stages::clusters::{ClusterTree, MeshFaces, face_count};
+use crate::stages::clusters::{ClusterTree, MeshFaces, cache, face_count};
 use glam::{Mat4, UVec2, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -264,14 +264,16 @@ fn build_trees(stage: &Stage<'_>, materials: &FaceMaterials, world: &[Vec3]) -> 
             has_back: material.double_sided && !is_solid,
         });
     }
+    let folder = stage.cluster_cache;
     let build = |(positions, triangles, faces): &(&[Vec3], Vec<[u32; 3]>, std::ops::Range<usize>)| {
-        ClusterTree::build(&MeshFaces {
+        let mesh = MeshFaces {
             positions,
             triangles,
             albedo: &materials.albedo[faces.clone()],
             reflectance: &materials.reflectance[faces.clone()],
             emission: &materials.emission[faces.clone()],
-        })
+        };
+        cache::tree(&mesh, folder)
     };
     let trees: Vec<ClusterTree> = wanted.par_iter().map(build).collect();
     debug_assert!(trees.iter().all(|tree| face_count(&tree.clusters[0]) as usize == tree.faces.len()));

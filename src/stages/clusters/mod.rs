@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`contract`] | joins faces pairwise, the cheapest pair first: which clusters there are |
 //! | [`forest`] | orders them: preorder, every cluster's faces one range, depth bounded |
+//! | [`cache`] | keeps trees between runs |
 //! | [`measure`] | what each is like: oriented box, areas, spread of attributes |
 //!
 //! A tree belongs to a mesh; instances share it. The left child of cluster `i` is `i + 1`, the right one follows the
@@ -13,6 +14,7 @@
 //! [Gobbetti2003]: crate::methods::PAPERS
 //! [Garland2001]: crate::methods::PAPERS
 
+pub mod cache;
 mod calipers;
 pub mod contract;
 pub mod forest;
