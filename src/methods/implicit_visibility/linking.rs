@@ -189,7 +189,7 @@ impl Linking {
                 is_turned: u32::from(settings.frames != Frames::World || settings.spin != 0.0),
             },
         };
-        recorder.dispatch(&pass, window.plan.leaves().len() * bin_count as usize);
+        recorder.dispatch(&pass, window.plan.leaves().len() * 6 * settings.bins as usize);
     }
 
     /// The winners of one leaf's bins, for views and tests.

@@ -1,0 +1,193 @@
+//! Implicit visibility in figures, as ratios of one run: the stages of a frame by bins, as in the paper's Table 1; growth
+//! with the scene; bins gathered per second against a plain Rust loop; memory. Fastest of several rounds.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::Vec3;
+use linklight::gpu::{Context, Options, PassRecord};
+use linklight::methods::explicit_visibility::Stage;
+use linklight::methods::implicit_visibility::{ImplicitVisibility, Settings, bins};
+use linklight::scene::builtin::{self, Source};
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::load_bytes;
+use linklight::scene::pose::Pose;
+use linklight::scene::tessellate::{Fineness, tessellate};
+use linklight::stages::bvh::Bvh;
+use linklight::stages::trace::Tracer;
+use linklight::stages::work::Unwatched;
+use linklight::stages::world::World;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+const ROUNDS: usize = 3;
+const MEMORY: u64 = 4 << 30;
+
+/// Device milliseconds of a frame by stage.
+#[derive(Debug, Clone, Copy)]
+struct Frame {
+    update: f64,
+    create: f64,
+    refine_and_push: f64,
+    illumination: f64,
+    /// Of the last, gathers of a bounce alone.
+    gather: f64,
+}
+
+impl Frame {
+    fn of(records: &[PassRecord]) -> Self {
+        let sum = |is_own: &dyn Fn(&PassRecord) -> bool| -> f64 {
+            let own = records.iter().filter(|record| is_own(record));
+            own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
+        };
+        let under = |part: &'static str| move |record: &PassRecord| record.path.contains(part);
+        let (update, create) = (sum(&under("update elements")), sum(&under("create links")));
+        let refine_and_push = sum(&under("refine and push"));
+        Self {
+            update,
+            create,
+            refine_and_push,
+            illumination: sum(&|_| true) - update - create - refine_and_push,
+            gather: sum(&|record| record.name.ends_with("implicit_visibility/gather")),
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.update + self.create + self.refine_and_push + self.illumination
+    }
+}
+
+/// Whole frames with one bounce of a built-in scene; the fastest of all rounds, and the method as it stands.
+fn frames(context: &Context, name: &str, elements: u32, settings: Settings) -> (Frame, ImplicitVisibility) {
+    let bytes = match builtin::resolve(name) {
+        Ok(Source::File(bytes)) => bytes,
+        other => panic!("{name}: {other:?}"),
+    };
+    let scene = load_bytes(name, bytes).unwrap();
+    let rest = Pose::rest(&scene);
+    let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
+    let cut = tessellate(geometry, &rest, Fineness::Elements(elements), MEMORY).unwrap();
+    let environment = Environment::default();
+    let world = World::new(context, &scene, &cut.geometry, &rest, &environment, true).unwrap();
+    let positions = context.download(&world.positions).unwrap();
+    let bvh = Bvh::build(context, &positions, &cut.geometry.triangles).unwrap();
+    let stage = Stage {
+        scene: &scene,
+        geometry: &cut.geometry,
+        rest_positions: &cut.rest_positions,
+        environment: &environment,
+        world: &world,
+        tracer: Tracer::compute(&bvh, &world),
+        watch: &Unwatched,
+    };
+    let mut method = ImplicitVisibility::prepare(context, &stage, settings).unwrap();
+    let mut fastest: Option<Frame> = None;
+    // The first frame holds the driver's compile time.
+    for round in 0..=ROUNDS {
+        context.take_records();
+        method.link(context, &stage).unwrap();
+        let mut recorder = context.recorder("frame").unwrap();
+        method.solve(&mut recorder, &world, 1);
+        recorder.submit().unwrap();
+        let frame = Frame::of(&context.take_records());
+        if round > 0 && fastest.is_none_or(|fastest| frame.total() < fastest.total()) {
+            fastest = Some(frame);
+        }
+    }
+    (fastest.unwrap(), method)
+}
+
+/// The paper's Table 1, an NVIDIA card of 2007: milliseconds by stage.
+const PAPER: [(u32, [f64; 4]); 3] =
+    [(8, [12.0, 23.0, 30.0, 35.0]), (12, [12.0, 43.0, 35.0, 40.0]), (16, [12.0, 78.0, 60.0, 48.0])];
+
+fn stages(_: &mut Criterion) {
+    let context = Context::new(Options::default()).unwrap();
+    for refinement in [1.0, 2.0] {
+        for (bins, paper) in PAPER {
+            let (frame, method) =
+                frames(&context, "cornell-box", 3_400, Settings { bins, refinement, ..Settings::default() });
+            let share = |ms: f64| format!("{ms:.1} ms ({:.0} %)", 100.0 * ms / frame.total());
+            let report = method.report();
+            println!(
+                "{} elements, N = {bins}, refinement {refinement}: update {}, create {}, refine and push {}, illumination {}, \
+                 total {:.1} ms; paper {paper:?} ms; {:.2} M pairs/s, {:.2} M links proposed/s",
+                report.elements,
+                share(frame.update),
+                share(frame.create),
+                share(frame.refine_and_push),
+                share(frame.illumination),
+                frame.total(),
+                report.pairs_visited as f64 / frame.create * 1e-3,
+                report.pairs_linked as f64 / frame.create * 1e-3,
+            );
+        }
+    }
+}
+
+fn growth(_: &mut Criterion) {
+    let context = Context::new(Options::default()).unwrap();
+    let mut first = None;
+    for elements in [3_000, 8_000, 20_000, 50_000] {
+        let settings = Settings { bins: 8, refinement: 2.0, ..Settings::default() };
+        let (frame, method) = frames(&context, "cornell-box", elements, settings);
+        let count = f64::from(method.report().elements);
+        let per = frame.total() / (count * count.log2());
+        let first = *first.get_or_insert(per);
+        println!(
+            "{count} elements, N = 8: {:.0} ms, {} pairs, {:.2} of the first per N log N; {:.0} MiB of winners",
+            frame.total(),
+            method.report().pairs_visited,
+            per / first,
+            method.report().winner_bytes as f64 / (1 << 20) as f64
+        );
+    }
+}
+
+fn gather(criterion: &mut Criterion) {
+    let context = Context::new(Options::default()).unwrap();
+    let mut group = criterion.benchmark_group("gather bins");
+    group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_secs(1));
+    let settings = Settings::default();
+    let (frame, method) = frames(&context, "cornell-box", 8_000, settings);
+    let window = &method.linking().windows[0];
+    let (winners, count) = (context.download(&window.winners).unwrap(), window.plan.leaves().len());
+    let rows: Vec<Vec<u32>> =
+        (0..count).map(|leaf| winners.iter().skip(leaf).step_by(count).copied().collect()).collect();
+    let receivers = context.download(&method.linking().receivers).unwrap();
+    let radiosity = vec![Vec3::ONE; method.trees().topology.node_count() as usize];
+    let vectors = bins::vectors(settings.bins);
+    let bin_count = rows.len() as f64 * f64::from(settings.bin_count());
+    let plain = || {
+        let of_row = |(row, receiver): (&Vec<u32>, &linklight::gpu::shaders::types::Receiver)| {
+            let (mut sum, mut total) = (Vec3::ZERO, 0.0);
+            for (&winner, vector) in row.iter().zip(&vectors) {
+                let weight = vector.dot(receiver.normal);
+                if weight > 0.0 {
+                    total += weight;
+                    if winner < 1 << 31 {
+                        sum += weight * radiosity[winner as usize];
+                    }
+                }
+            }
+            sum / total
+        };
+        let irradiance: Vec<Vec3> = rows.par_iter().zip(&receivers[..count]).with_min_len(64).map(of_row).collect();
+        std::hint::black_box(irradiance)
+    };
+    let start = Instant::now();
+    for _ in 0..5 {
+        plain();
+    }
+    let plain_ms = 200.0 * start.elapsed().as_secs_f64();
+    println!(
+        "gather: {:.0} M bins/s on the device, {:.0} M bins/s in a plain loop",
+        bin_count / frame.gather * 1e-3,
+        bin_count / plain_ms * 1e-3
+    );
+    group.throughput(Throughput::Elements(bin_count as u64));
+    group.bench_function(BenchmarkId::new("plain loop", count), |bencher| bencher.iter(plain));
+    group.finish();
+}
+
+criterion_group!(benches, stages, growth, gather);
+criterion_main!(benches);
