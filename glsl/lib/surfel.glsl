@@ -7,6 +7,8 @@
 // Semi-axes of the ellipse of an inner node in standard deviations of the surface's points. A disc of the surface's own
 // area has 2; a rectangle lies within 2.45. Leaves' ellipses hold the corners of their cells.
 const float SURFEL_REACH = 2.5;
+// Of the outline of a cluster without a plane: what a sphere's has.
+const float SURFEL_OUTLINE = 1.8;
 // And of the disc whose solid angle the refinement looks at.
 const float SURFEL_EXTENT = 2.0;
 

@@ -4,10 +4,11 @@
 #include "lib/prelude.glsl"
 #include "lib/footprint.glsl"
 #include "lib/pair_queue.glsl"
+#include "lib/surfel.glsl"
 
 // One thread per pair (receiver, sender) of a step: drops it, refines it, or proposes the sender to the receiver's bins,
 // each of which keeps the nearest.                                                                 [Dong2007 4.2.2]
-// reads taken_pairs, node_segments, surfels [node_count], segments, receivers[leaf_count], bin_solid_angles[n * n] (sr),
+// reads taken_pairs, node_segments, surfels, moments [node_count], segments, receivers[leaf_count], bin_solid_angles[n * n] (sr),
 // window_levels   updates counters, pair_stack, keys[rows * 6 n n] (distance bits above, back and node below)   shared none
 // Differs from [Dong2007]: pairs are directed; a sender fills all the bins whose centres it covers, at its distance in
 // each, and blocks where it turns its back.
@@ -22,14 +23,13 @@ layout(set = 0, binding = 6, scalar) readonly buffer Receivers { Receiver receiv
 layout(set = 0, binding = 7, scalar) readonly buffer BinSolidAngles { float bin_solid_angles[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer WindowLevels { WindowLevel window_levels[]; };
 layout(set = 0, binding = 9, scalar) buffer Keys { uint64_t keys[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Moments { SurfelMoments moments[]; };
 layout(push_constant, scalar) uniform Params {
     uint n;                 // bins a side of a face
     float refinement;       // of a bin's solid angle, what a node may fill; 0 refines down to leaves
     uint is_single;         // 1: one bin a sender, as in the paper
     uint leaf_count;
 } params;
-const float PI = 3.14159265358979;
-
 uint row_first_key;
 uint sender_word;
 
@@ -69,11 +69,13 @@ void link(uint receiver, QuadtreeSegment of_receiver, Receiver at, vec3 offset, 
     }
     vec3 normal = b.normal, g1 = b.g1, g2 = b.g2;
     if (sender >= params.leaf_count && b.cos_cone < 0.5) {
-        // A cluster without a plane: as large from all sides.
-        normal = normalize(offset);
-        vec3 side = normalize(cross(normal, abs(normal.x) < 0.5 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)));
-        g1 = side / (1.25 * b.extent);
-        g2 = cross(normal, side) / (1.25 * b.extent);
+        // A cluster without a plane: its outline as seen from here.
+        Surfel outline = b;
+        outline.normal = normalize(offset);
+        shape_surfel(moments[sender], outline);
+        normal = outline.normal;
+        g1 = outline.g1 * (SURFEL_REACH / SURFEL_OUTLINE);
+        g2 = outline.g2 * (SURFEL_REACH / SURFEL_OUTLINE);
     }
     // The longer semi-axis, from the smaller singular value of (g1, g2).
     float p = dot(g1, g1), q = dot(g1, g2), r = dot(g2, g2);

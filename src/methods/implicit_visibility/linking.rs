@@ -139,6 +139,7 @@ impl Linking {
                 node_segments: &trees.node_segments,
                 segments: &trees.segments,
                 surfels: &trees.surfels,
+                moments: &trees.moments,
                 receivers: &self.receivers,
                 bin_solid_angles: &self.bin_solid_angles,
                 window_levels: &window.levels,

@@ -23,7 +23,8 @@ pub struct Quadtrees {
     pub segments: Buffer<QuadtreeSegment>,
     /// One per node.
     pub surfels: Buffer<Surfel>,
-    moments: Buffer<SurfelMoments>,
+    /// One per node.
+    pub moments: Buffer<SurfelMoments>,
 }
 
 impl Quadtrees {
