@@ -56,7 +56,7 @@ crate::settings! {
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// What decides whether a sender is seen.
-        gather_visibility: Visibility = Visibility::Auto, paper "surface shadow maps";
+        gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.

@@ -36,7 +36,7 @@ pub struct Texel {
     pub at: UVec2,
     /// Chart; the back of chart `c` counts as `chart_count + c`.
     pub chart: u32,
-    /// Centroid of the surface in the texel, metres.
+    /// Centroid of the surface in the texel, moved out of it where it is curved; metres.
     pub position: Vec3,
     /// Unit, of the surface itself, towards the texel's side.
     pub normal: Vec3,
@@ -214,7 +214,15 @@ fn texel(geometry: &Geometry, positions: &[Vec3], atlas: &Atlas, parts: &[Found]
         let (u, v) = normal.any_orthonormal_pair();
         (area.sqrt() * u, area.sqrt() * v)
     };
-    Texel { at, chart: 0, position: position / area, normal, area, side_u, side_v, first_part: 0 }
+    // On a curved surface the centroid lies under it, and would be hidden by it: out to the part that stands highest.
+    let centroid = position / area;
+    let height = |found: &Found| {
+        let [a, b, c] = geometry.triangles[found.part.triangle as usize].map(|vertex| positions[vertex as usize]);
+        let at = a + found.part.barycentrics.x * (b - a) + found.part.barycentrics.y * (c - a);
+        (at - centroid).dot(normal)
+    };
+    let position = centroid + parts.iter().map(height).fold(0.0, f32::max) * normal;
+    Texel { at, chart: 0, position, normal, area, side_u, side_v, first_part: 0 }
 }
 
 #[cfg(test)]
