@@ -29,7 +29,6 @@ use std::path::Path;
 pub enum Method {
     PathTracing(Box<PathTracing>),
     OnElements(Box<VertexShown>),
-    Antiradiance(Box<AntiradianceShown>),
     OnTexels(Box<TexelsShown>),
     FaceClusters(Box<FaceClustersShown>),
 }
@@ -37,13 +36,6 @@ pub enum Method {
 /// Face-cluster radiosity with the display stage that shows it.
 pub struct FaceClustersShown {
     method: FaceClusters,
-    shadow_maps: ShadowMaps,
-    g_buffer: GBuffer,
-}
-
-/// Antiradiance with the display stage that shows it.
-pub struct AntiradianceShown {
-    method: Antiradiance,
     shadow_maps: ShadowMaps,
     g_buffer: GBuffer,
 }
@@ -132,9 +124,7 @@ impl Method {
                 let method = Antiradiance::prepare(context, &explicit_stage(stage, watch), request.settings()?);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
-                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
-                let g_buffer = GBuffer::new(context, request.width, request.height)?;
-                Ok(Self::Antiradiance(Box::new(AntiradianceShown { method, shadow_maps, g_buffer })))
+                Self::on_elements(context, request, stage, Box::new(method))
             }
             "surface-shadow-maps" => {
                 Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
@@ -228,23 +218,6 @@ impl Method {
                 Ok(())
             }
             Self::OnTexels(shown) => shown.frame(context, request, stage, film, watch),
-            Self::Antiradiance(shown) => {
-                let AntiradianceShown { method, shadow_maps, g_buffer } = &mut **shown;
-                method.solve(context, world, request.bounces, watch).map_err(AppError::failed)?;
-                let mut recorder = context.recorder("frame")?;
-                recorder.scope("display", |recorder| {
-                    let light = VertexLight {
-                        direct_irradiance: method.direct_irradiance(),
-                        indirect_irradiance: method.indirect_irradiance(),
-                        back_elements: method.back_elements(),
-                        colors: None,
-                    };
-                    shadow_maps.draw(recorder, world, pose, *bounds);
-                    vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
-                });
-                recorder.submit()?;
-                Ok(())
-            }
             Self::FaceClusters(shown) => {
                 let FaceClustersShown { method, shadow_maps, g_buffer } = &mut **shown;
                 method.solve(context, &cluster_stage(stage, None, watch), request.bounces).map_err(AppError::failed)?;

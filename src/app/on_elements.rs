@@ -3,6 +3,7 @@
 use super::AppError;
 use crate::display::false_color::picked_element;
 use crate::gpu::{Buffer, Context};
+use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{ExplicitVisibility, Stage};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::scene::camera::View;
@@ -93,5 +94,46 @@ impl OnElements for ImplicitVisibility {
         let picked = picked_element(self.settings().pick, &positions, &triangles, backs, view, size);
         let colors = self.view_colors(context, picked).map_err(AppError::failed)?;
         Ok(Some(context.upload("implicit/view colors", &colors)?))
+    }
+}
+
+impl OnElements for Antiradiance {
+    fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
+        Self::solve(self, context, stage.world, bounces, stage.watch).map_err(AppError::failed)?;
+        if let (Some(last), true) = (self.residuals().last(), bounces > 0) {
+            tracing::info!("{} steps, the last changed {:.2} % of the light", last.step, 100.0 * last.relative());
+        }
+        Ok(())
+    }
+
+    fn elements(&self) -> &Elements {
+        Self::elements(self)
+    }
+
+    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+        Self::punctual_irradiance(self)
+    }
+
+    fn direct_irradiance(&self) -> &Buffer<Vec3> {
+        Self::direct_irradiance(self)
+    }
+
+    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+        Self::indirect_irradiance(self)
+    }
+
+    fn false_colors(
+        &self,
+        context: &Context,
+        world: &World,
+        view: &View,
+        size: UVec2,
+    ) -> Result<Option<Buffer<Vec3>>, AppError> {
+        let positions = context.download(&world.positions)?;
+        let triangles = context.download(&world.triangles)?;
+        let backs = &self.elements().topology.back_elements;
+        let picked = picked_element(self.settings().pick, &positions, &triangles, backs, view, size);
+        let colors = self.view_colors(context, picked).map_err(AppError::failed)?;
+        Ok(colors.map(|colors| context.upload("antiradiance/view colors", &colors)).transpose()?)
     }
 }

@@ -1,0 +1,77 @@
+//! What antiradiance lets the user choose.
+
+use super::BinCount;
+use super::views::DebugView;
+use crate::methods::pick::Pick;
+use crate::stages::direction_bins::Spread;
+use crate::stages::emitters::EmitterChoice;
+
+crate::choice! {
+    /// The order of the steps.
+    pub enum Scheme {
+        /// For each bounce, antiradiance is moved on until it settles; then light is reflected. Bounces are exact
+        Asymmetric = "asymmetric",
+        /// Each step reflects light and moves antiradiance on. Holds light of all bounces up to the number of iterations
+        Symmetric = "symmetric",
+    }
+}
+
+crate::choice! {
+    /// Which surfaces take away light that meets their backs.
+    pub enum Backs {
+        /// All but the outsides of closed meshes
+        Open = "open",
+        /// All
+        All = "all",
+        /// Double-sided materials alone, as in the paper
+        None = "none",
+    }
+}
+
+crate::settings! {
+    /// What antiradiance lets the user choose.
+    pub struct Settings {
+        /// Direction bins over the sphere: 8 k^2.
+        bins: BinCount = BinCount::of_octant_side(5), paper "128 (128 to 1024)";
+        /// The order of the steps.
+        scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
+        /// Steps of the symmetric scheme.
+        iterations: u32 = 8, range 1..=1000, unit "steps", paper "4 (8 for the finest pictures)";
+        /// Steps for antiradiance to settle, per bounce, at most: surfaces one behind the other that light crosses.
+        depth: u32 = 8, range 1..=1000, unit "steps", paper "the scene's depth complexity";
+        /// Antiradiance has settled where a step changes less than this share of the light.
+        tolerance: f32 = 0.002, range 0.0..=1.0, paper "not given";
+        /// How a sender larger than a bin spreads over the receiver's bins.
+        spread: Spread = Spread::Cone, paper "gaussian";
+        /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
+        refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
+        /// How far below zero the light of a bin may fall, of the mean light its side received unoccluded: keeps the
+        /// iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
+        /// never cuts.
+        undershoot: f32 = 0.5, range 0.0..=1e9, paper "no limit";
+        /// Which surfaces take away light that meets their backs.
+        backs: Backs = Backs::Open, paper "none: solids only";
+        /// Keep the tables in f16: half of the memory, entries off by 1/2048 at most.
+        half_tables: bool = true, paper "on";
+        /// How far animated parts may move before links are made anew; form factors follow in between.
+        motion_margin: f32 = 0.0, range 0.0..=1e6, unit "m", paper "bounds stated per object";
+        /// Average indirect light over the one-ring.
+        smoothing: bool = true, paper "splatting or vertex interpolation";
+        /// Neighbours take part in smoothing where normals differ by less than this.
+        feature_angle: f32 = 30.0, range 0.0..=180.0, unit "degrees", paper "not given";
+        /// How light of emissive surfaces reaches the elements directly.
+        emitters: EmitterChoice = EmitterChoice::Auto, paper "as elements";
+        /// Points on sampled emitters, together; each element casts a shadow ray to every one.
+        emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
+        /// How far shadow rays start off their surface, as a share of the scene's extent.
+        ray_offset: f32 = 1e-5, range 1e-7..=1e-2, paper "not given";
+        /// What the picture shows.
+        view: DebugView = DebugView::Radiance, paper "radiance";
+        /// The direction of propagation that views show, about the vertical.
+        view_azimuth: f32 = 0.0, range -360.0..=360.0, unit "degrees", paper "not given";
+        /// And above the horizon.
+        view_elevation: f32 = -90.0, range -90.0..=90.0, unit "degrees", paper "not given";
+        /// The element whose links a view shows.
+        pick: Pick = Pick::Nothing, paper "not given";
+    }
+}
