@@ -23,6 +23,11 @@ pub trait OnElements {
     /// Reflected at least once.
     fn indirect_irradiance(&self) -> &Buffer<Vec3>;
 
+    /// Indirect light as the eye of `view` sees it, where surfaces reflect unevenly; by default as it is.
+    fn look(&self, _: &Context, _: &World, _: &View) -> Result<&Buffer<Vec3>, AppError> {
+        Ok(self.indirect_irradiance())
+    }
+
     /// The colours of the debug view that the settings ask for, if they do, for a picture of `size` pixels.
     fn false_colors(&self, _: &Context, _: &World, _: &View, _: UVec2) -> Result<Option<Buffer<Vec3>>, AppError> {
         Ok(None)
@@ -120,6 +125,13 @@ impl OnElements for Antiradiance {
 
     fn indirect_irradiance(&self) -> &Buffer<Vec3> {
         Self::indirect_irradiance(self)
+    }
+
+    fn look(&self, context: &Context, world: &World, view: &View) -> Result<&Buffer<Vec3>, AppError> {
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("look", |recorder| Self::look(self, recorder, world, view));
+        recorder.submit()?;
+        Ok(self.shown_irradiance())
     }
 
     fn false_colors(

@@ -8,7 +8,8 @@
 // goes on where the light came from, negated.                                       [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[node_count * BIN_COUNT] (pushed down to
 //       the parents of leaves), environment[BIN_COUNT] (W m^-2 sr^-1),
-//       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count]
+//       source[2 leaf_count] (radiosity that needs no transport, W/m2, front and back), albedo[element_count],
+//       glossy_of_leaf[leaf_count], specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)
 // updates radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1: the most there was), exitant (rows of leaves; intensity per area, W m^-2 sr^-1)
 // writes irradiance[2 leaf_count] (W/m2), residuals[leaf_count] (W: how much the exitant light changed, how much there is)
 // shared 64 x (irradiance of both sides, residuals)
@@ -31,6 +32,8 @@ layout(set = 0, binding = 9, scalar) writeonly buffer Irradiance { vec3 irradian
 layout(set = 0, binding = 10, scalar) writeonly buffer Residuals { vec2 residuals[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 12, scalar) buffer Means { vec3 means[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer GlossyOfLeaf { uint glossy_of_leaf[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer Specular { vec3 specular[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
@@ -65,6 +68,7 @@ void main()
     uint parent = nodes[own.node].parent;
     uint row = own.node * BIN_COUNT, parent_row = parent == NONE ? NONE : parent * BIN_COUNT;
     bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0, reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
+    uint glossy = glossy_of_leaf[leaf];
     float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
 
     vec3 floor_front = -params.undershoot * means[2 * leaf], floor_back = -params.undershoot * means[2 * leaf + 1];
@@ -106,6 +110,7 @@ void main()
         float cosine = dot(own.normal, bin_directions[bin]);
         bool leaves_front = cosine > 0.0;
         vec3 radiance = (leaves_front ? b_front : b_back) / PI;
+        if (glossy != NONE) radiance += specular[glossy * BIN_COUNT + bin];
         if (!leaves_front || blocks_behind) radiance -= max(incident_in(row, parent_row, bin), leaves_front ? floor_back : floor_front);
         vec3 intensity = discrete_cosine(cosine, norm, BIN_COUNT) * radiance;
         vec3 change = abs(intensity - LOAD_ENTRY(exitant, row + bin));

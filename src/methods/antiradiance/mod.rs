@@ -15,6 +15,7 @@
 //! | L_in | `incident` | W m^-2 sr^-1 | `antiradiance/incident` |
 //! | F | weight of a transfer, times the sender's area | 1 | [`Transfers`] |
 //! | U | global pass and push | – | [`Transfers::gather`] |
+//! | f | Lambert, and GGX at leaves of [`Settings::gloss_threshold`] and more | sr^-1 | [`Gloss`] |
 //! | K, J | local pass: reflection, go-through | – | – |
 //! | E | `source`, as radiosity | W/m2 | `antiradiance/source` |
 //! | A | the negative part of `exitant` | W m^-2 sr^-1 | `antiradiance/exitant` |
@@ -28,11 +29,14 @@
 //! (selectable); open surfaces block light that meets their backs; incident
 //! radiance may not fall far below zero (selectable); near senders are discs, never more than half of the
 //! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
-//! What it does not do: transparent surfaces, and refinement by the light that is sent.
+//! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
+//! What it does not do: transparent surfaces, refinement by the light that is sent, splatting, specular reflection of
+//! direct light into the bins (the display adds it).
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
 mod bin_count;
+mod gloss;
 mod linking;
 mod report;
 mod scheme;
@@ -41,6 +45,7 @@ mod tables;
 mod views;
 
 pub use bin_count::BinCount;
+pub use gloss::Gloss;
 pub use linking::{LinkingError, NodeLinks, TransferWindow, Transfers, link_solid_angle};
 pub use report::Report;
 pub use scheme::{Residual, growth_rate};
@@ -106,6 +111,8 @@ struct State {
     direct: Buffer<Vec3>,
     indirect: Buffer<Vec3>,
     smoothed: Buffer<Vec3>,
+    /// Indirect light as the eye sees it.
+    shown: Buffer<Vec3>,
     /// Per light, then per element; 0..1.
     visibility: Buffer<f32>,
     /// Shadow rays of a batch, and their answers.
@@ -149,8 +156,10 @@ impl Antiradiance {
         let budget = check_memory(context, &plan, &settings, budget)?;
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
-        let tables =
-            Tables::new(context, &hierarchy, &bins, stage.environment, settings.half_tables, settings.undershoot)?;
+        let (bin_count, threshold) = (settings.bins.get(), settings.gloss_threshold);
+        let gloss = Gloss::new(context, &hierarchy, &elements, stage.world, threshold, bin_count)?;
+        let (half, undershoot) = (settings.half_tables, settings.undershoot);
+        let tables = Tables::new(context, &hierarchy, &bins, stage.environment, half, undershoot, gloss)?;
         let mut recorder = context.recorder("antiradiance")?;
         tables.update_norms(&mut recorder, &hierarchy, &bins);
         recorder.submit()?;
@@ -221,9 +230,10 @@ impl Antiradiance {
         Ok(recorder.submit()?)
     }
 
-    /// Takes over the world's present materials: no link work.
+    /// Takes over the world's present materials: no link work. Which leaves are glossy stays.
     pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
         self.elements.update_materials(recorder, world);
+        gloss::measure(recorder, &self.hierarchy, &self.elements, world, &self.tables.gloss.lobes);
     }
 
     /// The light of direct illumination and `bounces` more.                                 [Dachsbacher2007 4.2]
@@ -355,6 +365,7 @@ impl State {
             direct: context.buffer("antiradiance/direct", count)?,
             indirect: context.buffer("antiradiance/indirect", count)?,
             smoothed: context.buffer("antiradiance/smoothed", count)?,
+            shown: context.buffer("antiradiance/shown", count)?,
             visibility: context.buffer("antiradiance/visibility", count * light_count as usize)?,
             rays: context.buffer("antiradiance/shadow rays", shadow_rays)?,
             is_free: context.buffer("antiradiance/is free", shadow_rays)?,

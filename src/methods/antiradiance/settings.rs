@@ -51,6 +51,9 @@ crate::settings! {
         undershoot: f32 = 0.5, range 0.0..=1e9, paper "no limit";
         /// Which surfaces take away light that meets their backs.
         backs: Backs = Backs::Open, paper "none: solids only";
+        /// Leaves whose specular lobe reflects at least this much at normal incidence reflect it bin by bin; others reflect
+        /// diffusely alone.
+        gloss_threshold: f32 = 0.1, range 0.0..=2.0, paper "per material";
         /// Keep the tables in f16: half of the memory, entries off by 1/2048 at most.
         half_tables: bool = true, paper "on";
         /// How far animated parts may move before links are made anew; form factors follow in between.

@@ -1,5 +1,6 @@
 //! The light on the hierarchy: tables over nodes and bins, and the passes over them.
 
+use super::gloss::Gloss;
 use super::linking::Transfers;
 use crate::gpu::shaders::methods::antiradiance as passes;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
@@ -37,6 +38,8 @@ pub struct Tables {
     pub irradiance: Buffer<Vec3>,
     /// Direct light of linked emitters and of the environment.
     pub linked: Buffer<Vec3>,
+    /// The leaves with specular lobes, and what those send.
+    pub gloss: Gloss,
     /// Per leaf, W: change of the exitant light in the last step, and its sum.
     pub residuals: Buffer<Vec2>,
 }
@@ -70,6 +73,7 @@ impl Tables {
         environment: &Environment,
         half: bool,
         undershoot: f32,
+        gloss: Gloss,
     ) -> Result<Self, GpuError> {
         let bin_count = bins.bins.count();
         let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
@@ -78,6 +82,7 @@ impl Tables {
             bin_count,
             half,
             undershoot,
+            gloss,
             exitant: context.buffer("antiradiance/exitant", words)?,
             incident: context.buffer("antiradiance/incident", words)?,
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
@@ -116,6 +121,7 @@ impl Tables {
         recorder.fill(&self.incident, 0);
         recorder.fill(&self.exitant, 0);
         recorder.fill(&self.means, 0);
+        recorder.fill(&self.gloss.specular, 0);
         self.local(
             recorder,
             hierarchy,
@@ -177,6 +183,9 @@ impl Tables {
         elements: &Elements,
         step: LocalStep,
     ) {
+        if step.reflects {
+            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins));
+        }
         let leaf_count = hierarchy.leaf_count();
         let pass = passes::Local {
             leaves: &hierarchy.leaves,
@@ -190,6 +199,8 @@ impl Tables {
             radiosity: &self.radiosity,
             exitant: &self.exitant,
             means: &self.means,
+            glossy_of_leaf: &self.gloss.glossy_of_leaf,
+            specular: &self.gloss.specular,
             irradiance: &self.irradiance,
             residuals: &self.residuals,
             constants: passes::LocalConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },

@@ -1,0 +1,53 @@
+#ifndef GLOSS
+#define GLOSS
+// Specular reflection of a leaf towards a direction, from its incident bins.
+// The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
+// means, and has params.undershoot.
+#include "lib/brdf.glsl"
+#include "lib/direction_bins.glsl"
+#include "lib/hierarchy.glsl"
+#include "lib/leaf_gloss.glsl"
+#include "lib/specular_albedo.glsl"
+#include "methods/antiradiance/table.glsl"
+
+// The surface of a leaf as its specular lobe sees it, on the side of `normal`. No lobe is narrower than a bin.
+Surface glossy_surface(LeafGloss g, vec3 normal)
+{
+    Surface s;
+    s.albedo = vec3(0.0);
+    s.f0 = g.f0;
+    s.f90 = g.f90;
+    s.alpha = sqrt(g.alpha * g.alpha + 1.0 / float(BIN_COUNT));
+    s.emission = vec3(0.0);
+    s.normal = normal;
+    s.reflects = true;
+    return s;
+}
+
+// Radiance reflected towards `to_eye`: the lobe's albedo times the mean of what arrives within it, so that the sum over
+// few bins neither makes nor loses light.                                                        [Dachsbacher2007 Eq. 18]
+vec3 glossy_radiance(uint leaf, vec3 to_eye)
+{
+    HierarchyLeaf own = leaves[leaf];
+    float side = dot(own.normal, to_eye) > 0.0 ? 1.0 : -1.0;
+    if (side < 0.0 && (own.flags & REFLECTS_BEHIND) == 0) return vec3(0.0);
+    vec3 normal = side * own.normal;
+    Surface s = glossy_surface(gloss[leaf], normal);
+    uint parent = nodes[own.node].parent, row = own.node * BIN_COUNT;
+    vec3 lowest = -params.undershoot * means[2 * leaf + (side > 0.0 ? 0 : 1)];
+
+    vec3 sum = vec3(0.0), weights = vec3(0.0);
+    for (uint bin = 0; bin < BIN_COUNT; ++bin) {
+        vec3 w = bin_directions[bin];
+        float cosine = dot(normal, w);
+        if (cosine > 0.0) continue;
+        vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
+        vec3 arriving = LOAD_ENTRY(incident, row + bin);
+        if (parent != NONE) arriving += LOAD_ENTRY(incident, parent * BIN_COUNT + bin);
+        sum += weight * max(arriving, lowest);
+        weights += weight;
+    }
+    vec3 mean = sum / max(weights, vec3(1e-20));
+    return max(specular_albedo(s, dot(normal, to_eye)) * mean, vec3(0.0));
+}
+#endif

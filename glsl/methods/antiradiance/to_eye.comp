@@ -1,0 +1,49 @@
+#version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#include "lib/prelude.glsl"
+#include "lib/element.glsl"
+#include "lib/hierarchy.glsl"
+#include "lib/leaf_gloss.glsl"
+
+// One thread per glossy leaf: the irradiance that, reflected evenly as the display does, gives what its specular lobe sends
+// to the eye besides its diffuse light.
+// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, incident, positions, albedo,
+// irradiance[element_count] (W/m2)   updates shown[element_count] (W/m2; of glossy leaves)   shared none
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
+layout(constant_id = 1) const uint BIN_COUNT = 128;
+layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Incident { uint64_t incident[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
+// eye: position and 1, or the direction to an orthographic eye and 0.
+layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; float undershoot; } params;
+
+#include "methods/antiradiance/gloss.glsl"
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= params.glossy_count) return;
+    uint leaf = glossy_leaves[i];
+    vec3 offset = params.eye.w == 0.0 ? params.eye.xyz : params.eye.xyz - positions[leaves[leaf].element];
+    vec3 to_eye = offset / max(length(offset), 1e-20), normal = leaves[leaf].normal;
+    bool sees_front = dot(normal, to_eye) > 0.0;
+    uint element = sees_front ? leaves[leaf].element : leaves[leaf].back_element;
+    if (element == NONE) return;
+
+    // What the display multiplies with: the surface's own lobe, not the widened one.
+    Surface s = glossy_surface(gloss[leaf], sees_front ? normal : -normal);
+    s.alpha = gloss[leaf].alpha;
+    vec3 reflectance = albedo[element] + specular_albedo(s, dot(s.normal, to_eye));
+    vec3 sent = albedo[element] * irradiance[element] + PI * glossy_radiance(leaf, to_eye);
+    shown[element] = sent / max(reflectance, vec3(1e-4));
+}

@@ -1,0 +1,153 @@
+//! Glossy leaves: their specular lobes, reflected bin by bin, and seen from the eye.
+
+use super::Antiradiance;
+use super::tables::Tables;
+use crate::gpu::shaders::methods::antiradiance as passes;
+use crate::gpu::shaders::types::LeafGloss;
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::camera::{Lens, View};
+use crate::stages::direction_bins::DeviceBins;
+use crate::stages::elements::Elements;
+use crate::stages::hierarchy::{Hierarchy, NONE};
+use crate::stages::world::World;
+use glam::Vec3;
+
+/// The glossy leaves of a scene.
+pub struct Gloss {
+    pub count: u32,
+    /// Per leaf.
+    pub lobes: Buffer<LeafGloss>,
+    /// The leaves that are glossy.
+    pub leaves: Buffer<u32>,
+    /// Per leaf: its place among the glossy ones, or [`NONE`].
+    pub glossy_of_leaf: Buffer<u32>,
+    /// Per glossy leaf and bin: what the lobe sends, W m^-2 sr^-1.
+    pub specular: Buffer<Vec3>,
+}
+
+impl Gloss {
+    /// Bytes of the table of `count` glossy leaves.
+    pub fn table_bytes(count: usize, bin_count: u32) -> u64 {
+        count as u64 * u64::from(bin_count) * size_of::<Vec3>() as u64
+    }
+
+    /// Leaves whose lobes reflect at least `threshold` at normal incidence.
+    pub fn new(
+        context: &Context,
+        hierarchy: &Hierarchy,
+        elements: &Elements,
+        world: &World,
+        threshold: f32,
+        bin_count: u32,
+    ) -> Result<Self, GpuError> {
+        let leaf_count = hierarchy.leaf_count();
+        let lobes = context.buffer("antiradiance/gloss", leaf_count as usize)?;
+        let mut recorder = context.recorder("antiradiance")?;
+        measure(&mut recorder, hierarchy, elements, world, &lobes);
+        recorder.submit()?;
+        let measured = context.download(&lobes)?;
+        let glossy: Vec<u32> = (0..leaf_count)
+            .filter(|&leaf| {
+                let f0 = measured[leaf as usize].f0;
+                f0.max_element() > 0.0 && f0.max_element() >= threshold
+            })
+            .collect();
+        let mut glossy_of_leaf = vec![NONE; leaf_count as usize];
+        glossy.iter().zip(0..).for_each(|(&leaf, index)| glossy_of_leaf[leaf as usize] = index);
+        Ok(Self {
+            count: glossy.len() as u32,
+            leaves: context.upload("antiradiance/glossy leaves", &glossy)?,
+            glossy_of_leaf: context.upload("antiradiance/glossy of leaf", &glossy_of_leaf)?,
+            specular: context.buffer("antiradiance/specular", glossy.len() * bin_count as usize)?,
+            lobes,
+        })
+    }
+
+    /// What the lobes send of the light that arrived last.
+    pub fn reflect(&self, recorder: &mut Recorder<'_>, tables: &Tables, hierarchy: &Hierarchy, bins: &DeviceBins) {
+        let pass = passes::ReflectGlossy {
+            glossy_leaves: &self.leaves,
+            leaves: &hierarchy.leaves,
+            nodes: &hierarchy.nodes,
+            gloss: &self.lobes,
+            cosine_norms: &tables.cosine_norms,
+            bin_directions: &bins.directions,
+            means: &tables.means,
+            incident: &tables.incident,
+            specular: &self.specular,
+            constants: passes::ReflectGlossyConstants {
+                words: Tables::words(tables.half) as u32,
+                bin_count: tables.bin_count,
+            },
+            params: passes::ReflectGlossyParams { glossy_count: self.count, undershoot: tables.undershoot },
+        };
+        recorder.dispatch(&pass, self.count * tables.bin_count);
+    }
+}
+
+/// Every leaf's lobe by the world's present materials.
+pub(super) fn measure(
+    recorder: &mut Recorder<'_>,
+    hierarchy: &Hierarchy,
+    elements: &Elements,
+    world: &World,
+    lobes: &Buffer<LeafGloss>,
+) {
+    let leaf_count = hierarchy.leaf_count();
+    let pass = passes::MeasureGloss {
+        leaves: &hierarchy.leaves,
+        triangles: &world.triangles,
+        triangle_materials: &world.triangle_materials,
+        incident_offsets: &elements.incident_offsets,
+        incident_triangles: &elements.incident_triangles,
+        positions: &world.positions,
+        attributes: &world.attributes,
+        materials: &world.materials,
+        gloss: lobes,
+        textures: &world.textures,
+        params: passes::MeasureGlossParams { leaf_count },
+    };
+    recorder.dispatch(&pass, leaf_count);
+}
+
+impl Antiradiance {
+    /// Indirect light as the eye of `view` sees it: glossy leaves by their lobes.
+    pub fn look(&self, recorder: &mut Recorder<'_>, world: &World, view: &View) {
+        let shown = &self.state.shown;
+        recorder.copy(self.indirect_irradiance(), shown);
+        if self.tables.gloss.count == 0 {
+            return;
+        }
+        let eye = match view.lens {
+            Lens::Perspective { .. } => view.position.extend(1.0),
+            Lens::Orthographic { .. } => (-view.forward).extend(0.0),
+        };
+        let (tables, gloss) = (&self.tables, &self.tables.gloss);
+        let pass = passes::ToEye {
+            glossy_leaves: &gloss.leaves,
+            leaves: &self.hierarchy.leaves,
+            nodes: &self.hierarchy.nodes,
+            gloss: &gloss.lobes,
+            cosine_norms: &tables.cosine_norms,
+            bin_directions: &self.bins.directions,
+            means: &tables.means,
+            incident: &tables.incident,
+            positions: &world.positions,
+            albedo: &self.elements.albedo,
+            irradiance: self.indirect_irradiance(),
+            shown,
+            constants: passes::ToEyeConstants { words: Tables::words(tables.half) as u32, bin_count: tables.bin_count },
+            params: passes::ToEyeParams {
+                eye: eye.to_array(),
+                glossy_count: gloss.count,
+                undershoot: tables.undershoot,
+            },
+        };
+        recorder.dispatch(&pass, gloss.count);
+    }
+
+    /// What [`Self::look`] left, W/m2 per element.
+    pub fn shown_irradiance(&self) -> &Buffer<Vec3> {
+        &self.state.shown
+    }
+}
