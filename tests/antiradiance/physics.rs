@@ -199,3 +199,53 @@ fn a_thin_wall_shades_reflected_light() {
     println!("beside a thin wall {lit:.4} W/m2, behind it {shaded:.5}: {:.2} % leak", 100.0 * shaded / lit);
     assert!(lit > 0.0 && shaded < 0.05 * lit, "{shaded} behind, {lit} before");
 }
+
+/// A closed room of rough metal that emits 1 everywhere: each bounce has what its lobes reflect of the one before.
+#[test]
+fn a_glossy_furnace_neither_makes_nor_loses_light() {
+    let context = TestContext::new();
+    let mut world = builtin_scene("furnace");
+    for material in &mut world.materials {
+        material.base_color = glam::Vec4::new(0.5, 0.5, 0.5, 1.0);
+        (material.metallic, material.roughness, material.double_sided) = (1.0, 0.5, false);
+    }
+    let mut fixture = Fixture::new(&context, world, Some(0.75));
+    fixture.world = linklight::stages::world::World::new(
+        &context,
+        &fixture.scene,
+        &fixture.geometry,
+        &Pose::rest(&fixture.scene),
+        &fixture.environment,
+        false,
+    )
+    .unwrap();
+    let mut method = prepare(&context, &fixture, Settings { refinement: 2.0, ..settings(128) });
+    assert_eq!(method.tables().gloss.count, method.report().leaves, "all of it is metal");
+    let area = context.download(&method.elements().area).unwrap();
+    let bounces: Vec<f64> = (0..=3)
+        .map(|bounces| {
+            let solution = solve(&context, &mut method, &fixture, bounces);
+            mean(&solution.direct, &area) + mean(&solution.indirect, &area)
+        })
+        .collect();
+    // What arrives first is emission; what arrives next was reflected by lobes alone: by the fit of their albedo that the
+    // display uses too, [Karis2014], averaged over the hemisphere.
+    let roughness = (0.25f64.powi(2) + 1.0 / 128.0).powf(0.25);
+    let albedo = |cosine: f64| {
+        let r = [1.0 - roughness, 0.0425 - 0.0275 * roughness, 1.04 - 0.572 * roughness, 0.022 * roughness - 0.04];
+        let a004 = (r[0] * r[0]).min((-9.28 * cosine).exp2()) * r[0] + r[1];
+        0.5 * (r[2] - 1.04 * a004) + r[3] + 1.04 * a004
+    };
+    let steps = (0..1000).map(|k| (f64::from(k) + 0.5) / 1000.0);
+    let expected = steps.map(|cosine| 2.0 * cosine * albedo(cosine) / 1000.0).sum::<f64>();
+    let ratio =
+        |k: usize| (bounces[k + 1] - bounces[k]) / if k == 0 { bounces[0] } else { bounces[k] - bounces[k - 1] };
+    println!(
+        "glossy furnace: expected {expected:.4}; E0 {:.4}, each bounce has {:.4}, {:.4}, {:.4} of the one before",
+        bounces[0],
+        ratio(0),
+        ratio(1),
+        ratio(2)
+    );
+    assert!((0..3).all(|k| (ratio(k) / expected - 1.0).abs() < 0.03), "{bounces:?}, expected {expected}");
+}

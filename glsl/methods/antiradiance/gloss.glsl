@@ -2,13 +2,16 @@
 #define GLOSS
 // Specular reflection of a leaf towards a direction, from its incident bins.
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
-// means, and has params.undershoot.
+// means, has params.undershoot, and defines
+//     vec3 beside(uint bin)       radiance that arrives beside what the table holds
 #include "lib/brdf.glsl"
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
 #include "lib/specular_albedo.glsl"
 #include "methods/antiradiance/table.glsl"
+
+vec3 beside(uint bin);
 
 // The surface of a leaf as its specular lobe sees it, on the side of `normal`. No lobe is narrower than a bin.
 Surface glossy_surface(LeafGloss g, vec3 normal)
@@ -44,7 +47,7 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
         vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
         vec3 arriving = LOAD_ENTRY(incident, row + bin);
         if (parent != NONE) arriving += LOAD_ENTRY(incident, parent * BIN_COUNT + bin);
-        sum += weight * max(arriving, lowest);
+        sum += weight * max(arriving + beside(bin), lowest);
         weights += weight;
     }
     vec3 mean = sum / max(weights, vec3(1e-20));

@@ -29,6 +29,8 @@ layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; floa
 
 #include "methods/antiradiance/gloss.glsl"
 
+vec3 beside(uint bin) { return vec3(0.0); }
+
 void main()
 {
     uint i = linear_index();

@@ -23,6 +23,8 @@ pub struct Gloss {
     pub glossy_of_leaf: Buffer<u32>,
     /// Per glossy leaf and bin: what the lobe sends, W m^-2 sr^-1.
     pub specular: Buffer<Vec3>,
+    /// The same of direct light that came along links, alone.
+    pub base: Buffer<Vec3>,
 }
 
 impl Gloss {
@@ -59,12 +61,20 @@ impl Gloss {
             leaves: context.upload("antiradiance/glossy leaves", &glossy)?,
             glossy_of_leaf: context.upload("antiradiance/glossy of leaf", &glossy_of_leaf)?,
             specular: context.buffer("antiradiance/specular", glossy.len() * bin_count as usize)?,
+            base: context.buffer("antiradiance/specular of direct light", glossy.len() * bin_count as usize)?,
             lobes,
         })
     }
 
     /// What the lobes send of the light that arrived last.
-    pub fn reflect(&self, recorder: &mut Recorder<'_>, tables: &Tables, hierarchy: &Hierarchy, bins: &DeviceBins) {
+    pub fn reflect(
+        &self,
+        recorder: &mut Recorder<'_>,
+        tables: &Tables,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        has_environment: bool,
+    ) {
         let pass = passes::ReflectGlossy {
             glossy_leaves: &self.leaves,
             leaves: &hierarchy.leaves,
@@ -74,12 +84,18 @@ impl Gloss {
             bin_directions: &bins.directions,
             means: &tables.means,
             incident: &tables.incident,
+            base: &self.base,
+            environment: &tables.environment,
             specular: &self.specular,
             constants: passes::ReflectGlossyConstants {
                 words: Tables::words(tables.half) as u32,
                 bin_count: tables.bin_count,
             },
-            params: passes::ReflectGlossyParams { glossy_count: self.count, undershoot: tables.undershoot },
+            params: passes::ReflectGlossyParams {
+                glossy_count: self.count,
+                undershoot: tables.undershoot,
+                add_environment: u32::from(has_environment),
+            },
         };
         recorder.dispatch(&pass, self.count * tables.bin_count);
     }

@@ -31,7 +31,7 @@
 //! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent, splatting, specular reflection of
-//! direct light into the bins (the display adds it).
+//! punctual lights and sampled emitters into the bins (the display adds it).
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 

@@ -47,6 +47,7 @@ impl Antiradiance {
     pub(super) fn solve_linked(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         recorder.fill(&self.tables.linked, 0);
+        recorder.fill(&self.tables.gloss.base, 0);
         let has_environment = !self.tables.is_environment_black;
         if self.emitters.plan.linked_parts == 0 && !has_environment {
             return Ok(recorder.submit()?);
@@ -60,6 +61,9 @@ impl Antiradiance {
         self.settle(context, 0, has_environment, None)?;
         let mut recorder = context.recorder("antiradiance")?;
         recorder.copy(&self.tables.irradiance, &self.tables.linked);
+        let gloss = &self.tables.gloss;
+        gloss.reflect(&mut recorder, &self.tables, &self.hierarchy, &self.bins, has_environment);
+        recorder.copy(&gloss.specular, &gloss.base);
         Ok(recorder.submit()?)
     }
 

@@ -121,7 +121,7 @@ impl Tables {
         recorder.fill(&self.incident, 0);
         recorder.fill(&self.exitant, 0);
         recorder.fill(&self.means, 0);
-        recorder.fill(&self.gloss.specular, 0);
+        recorder.copy(&self.gloss.base, &self.gloss.specular);
         self.local(
             recorder,
             hierarchy,
@@ -184,7 +184,7 @@ impl Tables {
         step: LocalStep,
     ) {
         if step.reflects {
-            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins));
+            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false));
         }
         let leaf_count = hierarchy.leaf_count();
         let pass = passes::Local {
