@@ -10,7 +10,8 @@ use linklight::stages::work::Unwatched;
 fn both_schemes_agree_after_many_steps() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
-    for undershoot in [1e9, 0.0] {
+    // Without a floor: where one cuts, it lies elsewhere in each scheme.
+    for undershoot in [1e9] {
         let base = Settings { undershoot, refinement: 3.0, ..settings(128) };
         let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
         let asymmetric = Settings { scheme: Scheme::Asymmetric, depth: 40, tolerance: 1e-7, ..base };
