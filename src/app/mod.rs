@@ -3,7 +3,7 @@
 //! | module | command |
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
-//! | [`bench`] | `linklight bench`: how long frames and passes take, with confidence |
+//! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
 //! | [`devices`] | `linklight devices`: GPUs, usable or not |

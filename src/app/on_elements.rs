@@ -1,11 +1,11 @@
 //! What the frame asks of a method that solves on elements, whichever it is.
 
 use super::AppError;
-use crate::display::false_color::picked_element;
 use crate::gpu::{Buffer, Context};
 use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{ExplicitVisibility, Stage};
 use crate::methods::implicit_visibility::ImplicitVisibility;
+use crate::methods::pick::picked_element;
 use crate::scene::camera::View;
 use crate::stages::elements::Elements;
 use crate::stages::world::World;

@@ -12,13 +12,14 @@
 use super::direct::{self, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
-use super::{PixelView, false_color, sample_offset};
+use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display as passes;
 use crate::gpu::shaders::types::GatherCount;
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::report::tonemap::{Operator, ToneSettings};
 use crate::scene::camera::View;
 use crate::stages::bvh::Bvh;
+use crate::stages::false_color;
 use crate::stages::film::Film;
 use crate::stages::sender_tree::{NodeLayout, Representative, SenderTree, TreeOptions};
 use crate::stages::surface_maps::PlacedMaps;

@@ -9,35 +9,13 @@ use super::direct::{self, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
 use super::{PixelView, sample_offset};
+use crate::gpu::Recorder;
 use crate::gpu::shaders::display::{IrradianceVector, IrradianceVectorConstants, IrradianceVectorParams};
-use crate::gpu::shaders::types::FaceElement;
-use crate::gpu::{Buffer, Recorder};
 use crate::scene::camera::View;
 use crate::stages::film::Film;
+use crate::stages::irradiance_vector::ElementLight;
 use crate::stages::world::World;
-use glam::{UVec2, Vec3};
-
-/// What a method offers per element.
-#[derive(Clone, Copy)]
-pub struct ElementLight<'a> {
-    pub elements: &'a Buffer<FaceElement>,
-    /// Per triangle: the elements of its front and back, u32::MAX where there is none.
-    pub triangle_elements: &'a Buffer<UVec2>,
-    /// From emitters and the environment, per element and function; a column a channel, W/m2.
-    pub direct: &'a Buffer<[[f32; 3]; 3]>,
-    /// Reflected at least once.
-    pub indirect: &'a Buffer<[[f32; 3]; 3]>,
-    /// Functions an element.
-    pub functions: u32,
-    /// False colours per element.
-    pub colors: &'a Buffer<Vec3>,
-    /// They are shown instead of all light, unlit.
-    pub shows_colors: bool,
-    /// GGX alpha of the narrowest lobe.
-    pub least_alpha: f32,
-    /// Shade at vertices and interpolate.
-    pub per_vertex: bool,
-}
+use glam::UVec2;
 
 /// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
 #[expect(clippy::too_many_arguments, reason = "everything a picture is made of, each by its own type")]

@@ -4,7 +4,6 @@
 //! |---|---|
 //! | [`shadow_maps`] | reversed depth of every view of every punctual light |
 //! | [`g_buffer`] | which triangle each pixel sees, and the surface there |
-//! | [`false_color`] | debug views: palettes, and the element under a pixel |
 //! | [`direct`] | what every display stage starts from: background, emission, punctual light |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
 //! | [`lightmap`] | the display stage that filters the texels of an atlas |
@@ -15,7 +14,6 @@
 //! comes after, in [`crate::report::tonemap`].
 
 pub mod direct;
-pub mod false_color;
 pub mod final_gather;
 pub mod g_buffer;
 pub mod irradiance_vector;

@@ -130,6 +130,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1093/biomet/69.3.653"),
     },
     Paper {
+        key: "Ciura2001",
+        title: "Best Increments for the Average Case of Shellsort",
+        authors: "Marcin Ciura",
+        year: 2001,
+        venue: "Fundamentals of Computation Theory, LNCS 2138",
+        doi: Some("10.1007/3-540-44669-9_12"),
+    },
+    Paper {
         key: "Cools2003",
         title: "An Encyclopaedia of Cubature Formulas",
         authors: "Ronald Cools",

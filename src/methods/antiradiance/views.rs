@@ -1,8 +1,8 @@
 //! Debug views: false colours per element that show what the method holds.
 
 use super::{Antiradiance, AntiradianceError, Settings, Tables};
-use crate::display::false_color::{self, NEUTRAL, PICKED};
 use crate::gpu::{Context, GpuError};
+use crate::stages::false_color::{self, NEUTRAL, PICKED};
 use crate::stages::hierarchy::NONE;
 use glam::Vec3;
 use std::f32::consts::PI;

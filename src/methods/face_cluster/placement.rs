@@ -39,7 +39,7 @@ struct Placed {
     has_back: bool,
 }
 
-/// See the [module](self).
+/// What the head of this file describes.
 pub struct Placement {
     pub trees: Vec<ClusterTree>,
     pub clusters: Buffer<FaceCluster>,

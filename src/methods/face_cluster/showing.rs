@@ -1,9 +1,10 @@
 //! What the method offers the display: light, or false colours of its elements.
 
 use super::{FaceClusterError, FaceClusters};
-use crate::display::irradiance_vector::ElementLight;
 use crate::gpu::shaders::types::FaceElement;
 use crate::gpu::{Buffer, Context};
+use crate::stages::false_color;
+use crate::stages::irradiance_vector::ElementLight;
 use glam::Vec3;
 
 crate::choice! {
@@ -39,11 +40,11 @@ impl FaceClusters {
         let count = self.report.elements as usize;
         let colors = match self.settings.show {
             Shown::Light => vec![Vec3::ZERO],
-            Shown::Elements => (0..count as u32).map(color_of).collect(),
+            Shown::Elements => (0..count as u32).map(false_color::of_index).collect(),
             Shown::Levels => {
                 let elements: Vec<FaceElement> = context.download_range(&self.state.elements, 0..count)?;
                 let deepest = self.report.element_depth.max(1) as f32;
-                elements.iter().map(|e| ramp(e.level as f32 / deepest)).collect()
+                elements.iter().map(|e| false_color::of_amount(e.level as f32 / deepest)).collect()
             }
             Shown::Unshot => {
                 let functions = self.settings.radiosity_basis.functions() as usize;
@@ -68,20 +69,4 @@ impl FaceClusters {
             per_vertex: self.settings.shading == Shading::Vertex,
         }
     }
-}
-
-/// A colour that differs from its neighbours': hues by the golden ratio.
-fn color_of(index: u32) -> Vec3 {
-    let hue = (index as f32 * 0.618_034).fract() * 6.0;
-    let channel = |offset: f32| {
-        let k = (hue + offset).rem_euclid(6.0);
-        0.15 + 0.75 * (2.0 - (k - 3.0).abs()).clamp(0.0, 1.0)
-    };
-    Vec3::new(channel(3.0), channel(1.0), channel(5.0))
-}
-
-/// Blue over green to red.
-fn ramp(share: f32) -> Vec3 {
-    let t = share.clamp(0.0, 1.0);
-    Vec3::new((2.0 * t - 1.0).max(0.0), 1.0 - (2.0 * t - 1.0).abs(), (1.0 - 2.0 * t).max(0.0))
 }

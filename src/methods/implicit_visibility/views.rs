@@ -2,10 +2,10 @@
 
 use super::linking::ImplicitError;
 use super::{ImplicitVisibility, bins};
-use crate::display::false_color::{self, NEUTRAL, PICKED};
 use crate::gpu::Context;
 use crate::scene::charts::NO_CHART;
 use crate::stages::elements::BACK_SIDE;
+use crate::stages::false_color::{self, NEUTRAL, PICKED};
 use glam::{Quat, Vec3};
 
 crate::choice! {

@@ -1,8 +1,8 @@
 //! Charts: pieces of the surface laid flat, each without folds or overlaps, in metres.
 //!
 //! A connected piece of the model's own texture coordinates is taken where it can serve: every triangle the same way
-//! round, no two over each other, no part blown up against the rest ([`model`]). Everything else is cut anew: charts
-//! grow over neighbouring triangles whose normals agree and are projected along their mean normal ([`grow`]).
+//! round, no two over each other, no part blown up against the rest (`model`). Everything else is cut anew: charts
+//! grow over neighbouring triangles whose normals agree and are projected along their mean normal (`grow`).
 //!
 //! Two users: surface hierarchies order their leaves along a chart ([`Charts::vertex_uv`]), and atlases place texels on
 //! it ([`Charts::corner_uv`]). It packs nothing: charts lie one over the other, each at its own origin.

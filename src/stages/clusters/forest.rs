@@ -1,6 +1,6 @@
 //! The order of a cluster tree: from joins to preorder, with every cluster's faces in one range.
 //!
-//! Components are joined at the top by place; below [`DEEP`] levels a subtree is halved instead, so that no mesh makes
+//! Components are joined at the top by place; below `DEEP` levels a subtree is halved instead, so that no mesh makes
 //! a tree deeper than [`super::MAX_DEPTH`].
 
 use super::contract::Merges;
