@@ -85,9 +85,10 @@ const uint BVH_LEVELS = 48;
 // The closest hit, or any hit where `any` is true (a constant at each call).
 //
 // Each turn takes one node and one triangle, from two queues, so that threads in lockstep have both to do most of the
-// time; in turns of a node or a leaf they mostly wait for each other. Closest hits per CPU-second on lavapipe 25 as
-// multiples of obvhs's CWBVH traversal on the CPU, scene of benches/trace with 64k triangles (2026-11): 1.9, and 1.95
-// with 1M. Of the trials, with 64k: tables in storage buffers of 64-bit words 1.1 (a load there is a test and a branch
+// time; in turns of a node or a leaf they mostly wait for each other. `cargo bench --bench trace` on lavapipe 25, two quiet
+// cores, as multiples of obvhs's CWBVH traversal on the CPU (2026-11): closest hits 1.50 with 64k triangles, 1.62 with 1M;
+// any hit 1.33 and 0.98. Of the trials, per CPU-second with 64k where this kernel had 1.9: tables in storage buffers of
+// 64-bit words 1.1 (a load there is a test and a branch
 // per thread, a texel fetch is not); a node or a leaf by turns 0.75 in such buffers; bounds in f32 0.35 to 0.45, eight
 // children less; leaves of one triangle 1.7; new rays for threads that are done, every 8 to 24 turns, 1.85.
 Hit traverse(Ray ray, bool any)
