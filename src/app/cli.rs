@@ -9,8 +9,8 @@ use super::compare::Variation;
 use super::console::Verbosity;
 use super::diff::Limit;
 use super::values::{
-    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction,
-    parse_measuring_seconds, parse_method, parse_size,
+    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction, parse_glb,
+    parse_measuring_seconds, parse_method, parse_scale, parse_size,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -65,6 +65,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Measure how long frames and passes take: methods, settings and devices in turns, with confidence
     Bench(BenchArgs),
+    /// Write a method's solution into the scene: vertex colours, a lightmap, or light by direction
+    Bake(BakeArgs),
     /// Print how far picture A is from reference B
     Diff(DiffArgs),
     /// List the GPUs, usable or not, and what they offer
@@ -274,6 +276,65 @@ pub struct BenchArgs {
     /// Options of `linklight render` for all subjects, such as -- --size 480x270 --bounces 2
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     pub options: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct BakeArgs {
+    /// A .gltf or .glb file, or builtin:NAME
+    #[arg(value_name = "SCENE")]
+    pub scene: SceneSource,
+    /// Scene to write; a lightmap's .exr is written beside it
+    #[arg(short, long, value_name = "FILE.glb", value_parser = parse_glb)]
+    pub output: PathBuf,
+    /// Where the light goes [default: vertex-colors; lightmap for surface-shadow-maps]
+    #[arg(long, value_enum)]
+    pub into: Option<BakeForm>,
+    /// Method, see `linklight methods`
+    #[arg(long, value_name = "KEY", value_parser = parse_method, default_value = "explicit-visibility")]
+    pub method: &'static Method,
+    /// A setting of the method; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// What surfaces are made of: unlit materials that show the light anywhere, or their own beside it
+    #[arg(long, value_enum, default_value_t)]
+    pub materials: BakeMaterials,
+    /// Radiance that unlit materials show as white [default: 99.9 % of all surface is darker]
+    #[arg(long, value_name = "W/m2/sr", value_parser = parse_scale)]
+    pub scale: Option<f32>,
+    /// Texels a side of the lightmap [default: as many as the scene's charts ask for, from 256]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(16..=2048))]
+    pub lightmap_size: Option<u32>,
+    /// Rays of each texel, for light by direction
+    #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub directions: u32,
+    /// Options of `linklight render`, such as -- --bounces 2 --elements 50000 --indirect-only
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    pub options: Vec<String>,
+}
+
+/// What a baked scene carries its light in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BakeForm {
+    /// COLOR_0 and the attribute _IRRADIANCE (W/m2)
+    VertexColors,
+    /// A second UV set, and irradiance (W/m2) as .exr
+    Lightmap,
+    /// As lightmap, with the vector irradiance of each channel as layers of the .exr
+    IrradianceVectors,
+    /// As lightmap, with spherical harmonics of bands 0 and 1 as layers of the .exr
+    SphericalHarmonics,
+}
+
+/// Materials of a baked scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BakeMaterials {
+    /// KHR_materials_unlit: the light can be seen in any viewer
+    #[default]
+    Unlit,
+    /// The scene's own: for programs that apply the light themselves
+    Original,
 }
 
 #[derive(Debug, Args)]

@@ -18,6 +18,7 @@ use crate::methods::explicit_visibility::{self, ExplicitVisibility};
 use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
+use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
 use crate::report::image::Picture;
 use crate::stages::film::Film;
 use crate::stages::sender_tree::{VertexElements, VertexLeaves};
@@ -31,6 +32,14 @@ pub enum Method {
     OnElements(Box<VertexShown>),
     OnTexels(Box<TexelsShown>),
     FaceClusters(Box<FaceClustersShown>),
+}
+
+/// A method's solution for one frame, before any display.
+pub enum Solved<'a> {
+    Elements(&'a dyn OnElements),
+    Texels(&'a SurfaceShadowMaps),
+    /// On neither: pixels, clusters.
+    Other,
 }
 
 /// Face-cluster radiosity with the display stage that shows it.
@@ -155,6 +164,24 @@ impl Method {
             _ => None,
         };
         Ok(Self::OnElements(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
+    }
+
+    /// The solution of `request.bounces` bounces alone.
+    pub fn solve(
+        &mut self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        watch: &dyn Watch,
+    ) -> Result<Solved<'_>, AppError> {
+        match self {
+            Self::OnElements(shown) => {
+                shown.method.solve(context, &explicit_stage(stage, watch), request.bounces)?;
+                Ok(Solved::Elements(&*shown.method))
+            }
+            Self::OnTexels(shown) => Ok(Solved::Texels(shown.solve(context, stage, request.bounces)?)),
+            Self::PathTracing(_) | Self::FaceClusters(_) => Ok(Solved::Other),
+        }
     }
 
     /// One frame into `film`.

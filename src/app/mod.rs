@@ -3,6 +3,7 @@
 //! | module | command |
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
+//! | [`bake`] | `linklight bake`: a solution into the scene |
 //! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
@@ -11,6 +12,7 @@
 //!
 //! A command writes what it was asked for to `out`; notes, progress and logs go to standard error.
 
+pub mod bake;
 pub mod bench;
 pub mod cli;
 pub mod compare;
@@ -49,6 +51,10 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
         cli::Command::Compare(args) => {
             let interrupt = interrupt::Interrupt::install();
             compare::run(&args, &cli.global, &console, &interrupt, out)
+        }
+        cli::Command::Bake(args) => {
+            let interrupt = interrupt::Interrupt::install();
+            bake::run(&args, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
         cli::Command::Devices(args) => devices::run(&args, &cli.global, out),

@@ -65,6 +65,16 @@ impl TexelsShown {
         Ok(Self { method, shadow_maps, g_buffer, shown })
     }
 
+    /// The solution of `bounces` bounces alone.
+    pub fn solve(&self, context: &Context, stage: &Stage, bounces: u32) -> Result<&SurfaceShadowMaps, AppError> {
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("surface-shadow-maps", |recorder| {
+            self.method.solve(recorder, &stage.world, &stage.tracer(), bounces);
+        });
+        recorder.submit()?;
+        Ok(&self.method)
+    }
+
     pub fn frame(
         &self,
         context: &Context,
@@ -76,14 +86,11 @@ impl TexelsShown {
         let (world, method) = (&stage.world, &self.method);
         // A final gather adds a bounce of its own; a lightmap shows what there is.
         let gathers = matches!(self.shown, Shown::FinalGather(_));
-        let bounces = if gathers { request.bounces.saturating_sub(1) } else { request.bounces };
+        self.solve(context, stage, if gathers { request.bounces.saturating_sub(1) } else { request.bounces })?;
         let mut recorder = context.recorder("frame")?;
-        recorder.scope("surface-shadow-maps", |recorder| {
-            method.solve(recorder, world, &stage.tracer(), bounces);
-            if gathers && request.bounces == 0 {
-                method.emit_only(recorder);
-            }
-        });
+        if gathers && request.bounces == 0 {
+            method.emit_only(&mut recorder);
+        }
         recorder.scope("display", |recorder| self.shadow_maps.draw(recorder, world, &stage.pose, stage.bounds));
         recorder.submit()?;
         if let Some(path) = &request.lightmap {

@@ -71,7 +71,8 @@ pub fn write_measurements(
     Ok(())
 }
 
-fn metadata(request: &RenderRequest, device: &gpu::DeviceInfo) -> Result<Metadata, AppError> {
+/// What a picture says about itself.
+pub fn metadata(request: &RenderRequest, device: &gpu::DeviceInfo) -> Result<Metadata, AppError> {
     let facts = [
         ("Software", format!("linklight {}", env!("CARGO_PKG_VERSION"))),
         ("scene", request.scene.to_string()),

@@ -179,6 +179,22 @@ pub fn parse_animation_seconds(text: &str) -> Result<f32, String> {
     number_within(text, 0.0, 1e6, "seconds")
 }
 
+/// `--scale`.
+pub fn parse_scale(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(number) if (1e-6..=1e9).contains(&number) => Ok(number),
+        _ => Err("expected a radiance from 1e-6 to 1e9 W/m2/sr".to_owned()),
+    }
+}
+
+/// A scene to write.
+pub fn parse_glb(text: &str) -> Result<PathBuf, String> {
+    match extension(Path::new(text)).as_str() {
+        "glb" => Ok(text.into()),
+        _ => Err("the name must end in .glb".to_owned()),
+    }
+}
+
 fn number_within(text: &str, min: f32, max: f32, unit: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(number) if (min..=max).contains(&number) => Ok(number),

@@ -254,6 +254,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1080/10867651.1997.10487468"),
     },
     Paper {
+        key: "Ramamoorthi2001",
+        title: "An Efficient Representation for Irradiance Environment Maps",
+        authors: "Ravi Ramamoorthi, Pat Hanrahan",
+        year: 2001,
+        venue: "SIGGRAPH 2001",
+        doi: Some("10.1145/383259.383317"),
+    },
+    Paper {
         key: "Reinhard2002",
         title: "Photographic Tone Reproduction for Digital Images",
         authors: "Erik Reinhard, Michael Stark, Peter Shirley, James Ferwerda",

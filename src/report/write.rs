@@ -53,9 +53,12 @@ pub fn write_whole<E: From<FileError>>(
 
 /// [`write_whole`] for text.
 pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
-    write_whole(path, |writer| {
-        writer.write_all(text.as_bytes()).map_err(|source| FileError::new("write", path, source))
-    })
+    write_bytes(path, text.as_bytes())
+}
+
+/// [`write_whole`] for bytes.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_whole(path, |writer| writer.write_all(bytes).map_err(|source| FileError::new("write", path, source)))
 }
 
 /// Whether [`write_whole`] has a chance at `path`: checked before long work, so that a misspelt folder costs nothing.

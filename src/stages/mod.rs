@@ -1,5 +1,6 @@
 //! What the methods share: each stage is a few passes over buffers, and knows nothing of any method.
 
+pub mod arriving_light;
 pub mod bvh;
 pub mod clusters;
 pub mod direction_bins;

@@ -4,6 +4,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod arriving_light;
 mod compare;
 mod deform;
 mod display;

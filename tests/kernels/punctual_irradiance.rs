@@ -17,7 +17,7 @@ fn vector(random: &mut Random) -> Vec3 {
     Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0
 }
 
-fn lights(random: &mut Random) -> Vec<PosedLight> {
+pub fn lights(random: &mut Random) -> Vec<PosedLight> {
     let spot = LightKind::Spot { inner_angle: 0.4, outer_angle: 0.9 };
     let kinds = [
         (LightKind::Point, None),
@@ -41,7 +41,7 @@ fn lights(random: &mut Random) -> Vec<PosedLight> {
 }
 
 /// Irradiance on a plane that faces the light, and the direction towards it.               [KHR_lights_punctual]
-fn arriving(light: &PosedLight, point: Vec3) -> (Vec3, Vec3) {
+pub fn arriving(light: &PosedLight, point: Vec3) -> (Vec3, Vec3) {
     if light.kind == LightKind::Directional {
         return (light.intensity, -light.direction);
     }

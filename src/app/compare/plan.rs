@@ -116,7 +116,8 @@ impl Plan<'_> {
         choices
     }
 
-    fn run(
+    /// One picture by `method`, with these settings and options on top of what all runs share.
+    pub fn run(
         &self,
         scene: &SceneSource,
         method: &'static Method,

@@ -26,7 +26,7 @@ use crate::gpu::shaders::methods::surface_shadow_maps as passes;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
-use crate::scene::atlas::{self, Atlas, AtlasError};
+use crate::scene::atlas::{Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
@@ -345,23 +345,10 @@ impl SurfaceShadowMaps {
     }
 }
 
-/// Texels that a chart has in the mean, at least, where the resolution is not given.
-const TEXELS_PER_CHART: usize = 3;
-
 fn make_atlas(stage: &Stage<'_>, resolution: u32) -> Result<Atlas, AtlasError> {
-    let make = |resolution| Atlas::new(stage.scene, stage.geometry, stage.positions, resolution);
-    if resolution > 0 {
-        return make(resolution);
-    }
-    let mut resolution = 64;
-    loop {
-        match make(resolution) {
-            Ok(atlas) if resolution >= 256 || atlas.texels.len() >= TEXELS_PER_CHART * atlas.chart_count as usize => {
-                return Ok(atlas);
-            }
-            Err(error) if resolution >= atlas::MAX_RESOLUTION => return Err(error),
-            _ => resolution *= 2,
-        }
+    match resolution {
+        0 => Atlas::fitting(stage.scene, stage.geometry, stage.positions, 64, 256),
+        given => Atlas::new(stage.scene, stage.geometry, stage.positions, given),
     }
 }
 

@@ -19,6 +19,9 @@ pub const NO_TEXEL: u32 = u32::MAX;
 /// Texels a side of the finest atlas.
 pub const MAX_RESOLUTION: u32 = 2048;
 
+/// Texels that a chart has in the mean, at least, where the resolution is not given.
+const TEXELS_PER_CHART: usize = 3;
+
 /// Why a surface has no atlas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AtlasError {
@@ -98,6 +101,29 @@ impl Atlas {
             back_of[chart] = Some(packing.places[count + index]);
         }
         Ok(Self::cut(geometry, positions, &charts, &packing, &back_of, resolution))
+    }
+
+    /// The coarsest atlas, of `least` texels a side or twice, four times ... as many, whose charts have some texels each
+    /// in the mean; beyond `enough` any that the charts fit into will do.
+    pub fn fitting(
+        scene: &Scene,
+        geometry: &Geometry,
+        positions: &[Vec3],
+        least: u32,
+        enough: u32,
+    ) -> Result<Self, AtlasError> {
+        let mut resolution = least;
+        loop {
+            match Self::new(scene, geometry, positions, resolution) {
+                Ok(atlas)
+                    if resolution >= enough || atlas.texels.len() >= TEXELS_PER_CHART * atlas.chart_count as usize =>
+                {
+                    return Ok(atlas);
+                }
+                Err(error) if resolution >= MAX_RESOLUTION => return Err(error),
+                _ => resolution *= 2,
+            }
+        }
     }
 
     fn cut(

@@ -28,6 +28,8 @@ mod tangent;
 mod texture;
 mod topology;
 mod uri;
+pub mod write;
+pub mod write_materials;
 
 pub use error::{Fault, SceneError};
 

@@ -1,10 +1,11 @@
 //! A stage with two performers: a skinned dancer and a hopping blob that morphs between three shapes. One clip of four
 //! seconds, with LINEAR and CUBICSPLINE channels.
 
-use super::document::{Document, FLOAT, Material, Placement, UNSIGNED_BYTE, number, numbers};
+use super::document::{Document, Material, Placement};
 use super::figure::{self, JOINTS, LOOP};
 use super::kit::{self, plan_uv, profile, rod, slab};
 use glam::{Vec2, Vec3};
+use linklight::scene::gltf::write::{FLOAT, Target, UNSIGNED_BYTE, UNSIGNED_SHORT, number, numbers};
 use linklight::scene::shapes::{Shape, sin_cos};
 use serde_json::{Value, json};
 
@@ -117,10 +118,12 @@ impl Animation {
             _ => (4, "LINEAR"),
         };
         let bounds = json!({ "min": [number(times[0])], "max": [number(times[times.len() - 1])] });
-        let input = document.accessor("SCALAR", FLOAT, times.len(), bytemuck::cast_slice(times), bounds);
+        let binary = &mut document.binary;
+        let bytes = bytemuck::cast_slice(times);
+        let input = binary.accessor("SCALAR", FLOAT, times.len(), bytes, Target::Other, &bounds);
         let rounded: Vec<f32> = values.iter().map(|v| (v * 16_384.0).round() / 16_384.0).collect();
-        let output =
-            document.accessor(kind, FLOAT, values.len() / components, bytemuck::cast_slice(&rounded), json!({}));
+        let (count, bytes) = (values.len() / components, bytemuck::cast_slice(&rounded));
+        let output = binary.accessor(kind, FLOAT, count, bytes, Target::Other, &Value::Null);
         let width = values.len() / times.len() / if interpolation == "LINEAR" { 1 } else { 3 };
         let first = if interpolation == "LINEAR" { 0 } else { width };
         document.nodes[node][path] = numbers(&rounded[first..first + width]);
@@ -160,17 +163,13 @@ fn performer(document: &mut Document, animation: &mut Animation) {
         .map(|p| figure::color(*p).map(|c| (c * 65_535.0).round() as u16))
         .map(|[r, g, b]| [r, g, b, u16::MAX])
         .collect();
-    let fields = json!({ "target": "vertices" });
-    let joints = document.accessor("VEC4", UNSIGNED_BYTE, count, joints.as_flattened(), fields.clone());
-    let normalized = json!({ "target": "vertices", "normalized": true });
-    let weights = document.accessor("VEC4", UNSIGNED_BYTE, count, weights.as_flattened(), normalized.clone());
-    let colors = document.accessor(
-        "VEC4",
-        super::document::UNSIGNED_SHORT,
-        count,
-        colors.as_flattened().iter().flat_map(|c| c.to_le_bytes()).collect::<Vec<u8>>().as_slice(),
-        normalized,
-    );
+    let mut attribute = |component: u32, bytes: &[u8], is_normalized: bool| {
+        let fields = if is_normalized { json!({ "normalized": true }) } else { Value::Null };
+        document.binary.accessor("VEC4", component, count, bytes, Target::Vertices, &fields)
+    };
+    let joints = attribute(UNSIGNED_BYTE, joints.as_flattened(), false);
+    let weights = attribute(UNSIGNED_BYTE, weights.as_flattened(), true);
+    let colors = attribute(UNSIGNED_SHORT, bytemuck::cast_slice(&colors), true);
     primitive["attributes"]["JOINTS_0"] = json!(joints);
     primitive["attributes"]["WEIGHTS_0"] = json!(weights);
     primitive["attributes"]["COLOR_0"] = json!(colors);
@@ -194,7 +193,10 @@ fn performer(document: &mut Document, animation: &mut Animation) {
             [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, x, y, z, 1.0]
         })
         .collect();
-    let matrices = document.accessor("MAT4", FLOAT, JOINTS.len(), bytemuck::cast_slice(&inverse_bind), json!({}));
+    let matrices = {
+        let bytes = bytemuck::cast_slice(&inverse_bind);
+        document.binary.accessor("MAT4", FLOAT, JOINTS.len(), bytes, Target::Other, &Value::Null)
+    };
     let list: Vec<usize> = (first..first + JOINTS.len()).collect();
     document
         .skins
@@ -284,7 +286,7 @@ fn target(document: &mut Document, shape: &Shape, bend: Bend) -> Value {
     bent.positions.iter_mut().for_each(|p| *p = bend(*p));
     let bent = bent.smoothed();
     let difference = |a: &[Vec3], b: &[Vec3]| -> Vec<Vec3> { a.iter().zip(b).map(|(a, b)| *a - *b).collect() };
-    let positions = document.vectors(&difference(&bent.positions, &shape.positions), true);
-    let normals = document.vectors(&difference(&bent.normals, &shape.normals), false);
+    let positions = document.binary.positions(&difference(&bent.positions, &shape.positions));
+    let normals = document.binary.floats("VEC3", &difference(&bent.normals, &shape.normals));
     json!({ "POSITION": positions, "NORMAL": normals })
 }

@@ -1,15 +1,9 @@
 //! A glTF 2.0 document under construction, written as one .glb.
 
 use glam::{Quat, Vec2, Vec3};
+use linklight::scene::gltf::write::{Binary, Target, number, numbers};
 use linklight::scene::shapes::Shape;
 use serde_json::{Map, Value, json};
-
-pub const FLOAT: u32 = 5126;
-pub const UNSIGNED_BYTE: u32 = 5121;
-pub const UNSIGNED_SHORT: u32 = 5123;
-const UNSIGNED_INT: u32 = 5125;
-const ARRAY_BUFFER: u32 = 34962;
-const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
 #[derive(Default)]
 pub struct Document {
@@ -23,9 +17,7 @@ pub struct Document {
     images: Vec<Value>,
     cameras: Vec<Value>,
     lights: Vec<Value>,
-    accessors: Vec<Value>,
-    views: Vec<Value>,
-    bytes: Vec<u8>,
+    pub binary: Binary,
     emissive_strength: bool,
     unlit: bool,
 }
@@ -106,16 +98,6 @@ impl Placement {
     }
 }
 
-/// The shortest decimal that reads back as `x`.
-pub fn number(x: f32) -> Value {
-    let shortest: f64 = (x + 0.0).to_string().parse().unwrap_or(0.0);
-    if shortest == shortest.trunc() && shortest.abs() < 1e9 { json!(shortest as i64) } else { json!(shortest) }
-}
-
-pub fn numbers(values: &[f32]) -> Value {
-    values.iter().map(|&x| number(x)).collect()
-}
-
 impl Document {
     pub fn new(name: &str) -> Self {
         Self { name: name.into(), ..Self::default() }
@@ -168,70 +150,23 @@ impl Document {
         });
         let mut png = std::io::Cursor::new(Vec::new());
         picture.write_to(&mut png, image::ImageFormat::Png).expect("an RGB picture in memory can be encoded");
-        let view = self.view(&png.into_inner(), None);
+        let view = self.binary.view(&png.into_inner(), Target::Other);
         self.images.push(json!({ "name": name, "mimeType": "image/png", "bufferView": view }));
         self.textures.push(json!({ "source": self.images.len() - 1, "sampler": 0 }));
         self.textures.len() - 1
     }
 
-    fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let mut view = json!({ "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len() });
-        if let Some(target) = target {
-            view["target"] = json!(target);
-        }
-        self.bytes.extend_from_slice(bytes);
-        self.views.push(view);
-        self.views.len() - 1
-    }
-
-    /// Appends an accessor over `bytes`; `fields` are merged in (min, max, normalized).
-    pub fn accessor(&mut self, kind: &str, component: u32, count: usize, bytes: &[u8], fields: Value) -> usize {
-        let target = match fields["target"].as_str() {
-            Some("vertices") => Some(ARRAY_BUFFER),
-            Some("indices") => Some(ELEMENT_ARRAY_BUFFER),
-            _ => None,
-        };
-        let view = self.view(bytes, target);
-        let mut accessor = json!({ "bufferView": view, "componentType": component, "count": count, "type": kind });
-        for key in ["min", "max", "normalized"] {
-            if !fields[key].is_null() {
-                accessor[key] = fields[key].clone();
-            }
-        }
-        self.accessors.push(accessor);
-        self.accessors.len() - 1
-    }
-
-    pub fn vectors(&mut self, values: &[Vec3], with_bounds: bool) -> usize {
-        let mut fields = json!({ "target": "vertices" });
-        if with_bounds {
-            let (low, high) = values.iter().fold((values[0], values[0]), |(l, h), p| (l.min(*p), h.max(*p)));
-            fields["min"] = numbers(&low.to_array());
-            fields["max"] = numbers(&high.to_array());
-        }
-        self.accessor("VEC3", FLOAT, values.len(), bytemuck::cast_slice(values), fields)
-    }
-
     /// A primitive of a mesh: `attributes` beyond position and normal may be added to the result.
     pub fn primitive(&mut self, material: usize, shape: &Shape) -> Value {
         let mut attributes = Map::new();
-        attributes.insert("POSITION".into(), json!(self.vectors(&shape.positions, true)));
-        attributes.insert("NORMAL".into(), json!(self.vectors(&shape.normals, false)));
+        attributes.insert("POSITION".into(), json!(self.binary.positions(&shape.positions)));
+        attributes.insert("NORMAL".into(), json!(self.binary.floats("VEC3", &shape.normals)));
         if let Some(metres) = self.materials[material]["extras"]["textureMetres"].as_f64() {
             let uv: Vec<Vec2> = shape.uv.iter().map(|t| *t / metres as f32).collect();
-            let fields = json!({ "target": "vertices" });
-            let accessor = self.accessor("VEC2", FLOAT, uv.len(), bytemuck::cast_slice(&uv), fields);
-            attributes.insert("TEXCOORD_0".into(), json!(accessor));
+            attributes.insert("TEXCOORD_0".into(), json!(self.binary.floats("VEC2", &uv)));
         }
         let indices: Vec<u32> = shape.triangles.iter().flatten().copied().collect();
-        let fields = json!({ "target": "indices" });
-        let accessor = if shape.positions.len() < 65_535 {
-            let short: Vec<u16> = indices.iter().map(|&i| i as u16).collect();
-            self.accessor("SCALAR", UNSIGNED_SHORT, short.len(), bytemuck::cast_slice(&short), fields)
-        } else {
-            self.accessor("SCALAR", UNSIGNED_INT, indices.len(), bytemuck::cast_slice(&indices), fields)
-        };
+        let accessor = self.binary.indices(&indices, shape.positions.len());
         json!({ "attributes": attributes, "indices": accessor, "material": material })
     }
 
@@ -333,15 +268,11 @@ impl Document {
                 material.remove("extras");
             }
         }
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let mut root = json!({
             "asset": { "version": "2.0", "generator": "linklight make-scenes", "copyright": "CC0 1.0, the linklight authors" },
             "scene": 0,
             "scenes": [{ "name": self.name, "nodes": roots }],
             "nodes": self.nodes,
-            "buffers": [{ "byteLength": self.bytes.len() }],
-            "bufferViews": self.views,
-            "accessors": self.accessors,
             "materials": self.materials,
             "meshes": self.meshes,
             "cameras": self.cameras,
@@ -374,21 +305,7 @@ impl Document {
         if !used.is_empty() {
             root["extensionsUsed"] = json!(used);
         }
-        let mut text = root.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-
-        let mut glb = Vec::new();
-        let total = 12 + 8 + text.len() + 8 + self.bytes.len();
-        let word = |x: u32, glb: &mut Vec<u8>| glb.extend_from_slice(&x.to_le_bytes());
-        word(0x4654_6C67, &mut glb);
-        word(2, &mut glb);
-        word(total as u32, &mut glb);
-        for (kind, chunk) in [(0x4E4F_534A, &text), (0x004E_4942, &self.bytes)] {
-            word(chunk.len() as u32, &mut glb);
-            word(kind, &mut glb);
-            glb.extend_from_slice(chunk);
-        }
-        glb
+        self.binary.glb(root).expect("our scenes are far below the 4 GiB of a .glb")
     }
 }
 
