@@ -216,7 +216,7 @@ fn transform([[a, b, x], [c, d, y]]: [[f32; 3]; 2]) -> Option<Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{LoadOptions, load_bytes};
+    use crate::scene::load_bytes;
     use glam::{Vec3, Vec4};
 
     fn scene() -> Scene {
@@ -265,7 +265,7 @@ mod tests {
             "meshes": [{ "primitives": [{ "attributes": attributes, "material": 0 }] }] });
         writer.finish(&mut root);
         let glb = binary.glb(root).unwrap();
-        let read = load_bytes(&glb, &LoadOptions::default()).unwrap();
+        let read = load_bytes("written.glb", &glb).unwrap();
         let (written, read_back) = (&scene.materials[0], &read.materials[0]);
         assert_eq!(read.images[0].rgba, scene.images[0].rgba);
         assert_eq!(read.textures[0], scene.textures[0]);
