@@ -143,7 +143,7 @@ fn queries(
         let off = method.texels.ray_offset;
         let origin = texels[receiver].position + off * texels[receiver].normal;
         let target = texels[sender].position + off * texels[sender].normal;
-        asked.push(SurfaceMapQuery { point: origin, place: maps.places[sender] });
+        asked.push(SurfaceMapQuery { point: origin, normal: texels[receiver].normal, place: maps.places[sender] });
         rays.push(Ray { origin, t_min: 0.0, direction: target - origin, t_max: 1.0 });
         if asked.len() == QUERIES {
             break;

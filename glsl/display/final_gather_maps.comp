@@ -2,7 +2,7 @@
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
 #include "lib/bvh.glsl"
-#include "lib/sender_tree.glsl"
+#include "lib/sender_gather.glsl"
 #include "lib/surface_map.glsl"
 #include "trace/holes.glsl"
 
@@ -27,7 +27,7 @@ float visibility(vec3 origin, vec3 target, uint leaf)
 {
     if (leaf == NO_SENDER) return is_hit(traverse(Ray(origin, 0.0, target - origin, 1.0), true)) ? 0.0 : 1.0;
     uint place = leaf_places[leaf];
-    return surface_map_visibility(map_frame[0], place, map_origins[place], origin);
+    return surface_map_visibility(map_frame[0], place, map_origins[place], origin, receiver.geometric);
 }
 
 #include "display/final_gather.glsl"

@@ -30,16 +30,35 @@ uint surface_map_depth(uint place, uint pixel)
     return surface_run(low) & 0xffffu;
 }
 
-float surface_pixel_seen(uint place, uint pixel, float code)
+// Widths of a pixel by which the point's plane may lie off the point's own distance.
+const float FARTHEST_PLANE = 16.0;
+
+// What is asked: a point with the unit normal of its surface, from where the map stands.
+struct SurfaceMapSight {
+    vec3 normal;
+    float height;       // of the point's plane over the map, metres
+    float distance_to;  // metres
+};
+
+// Whether the map at `place` sees the point's surface through a pixel. Depths are of the pixel's own ray: where that meets
+// the surface's plane is compared with what it met first, so that no slope needs a bias. A plane that the ray meets far
+// from the point, or never, tells nothing of the surface there: then the point's own distance counts.
+// Differs from [Ritschel2008]: they compare the point's distance, with a bias.
+float surface_pixel_seen(SurfaceMapFrame frame, SurfaceMapSight sight, uint place, uint pixel)
 {
+    float lean = dot(sight.normal, cube_pixel_direction(pixel, frame.resolution));
+    float along = sight.height / (lean == 0.0 ? 1e-30 : lean);
+    float width = FARTHEST_PLANE / float(frame.resolution) * sight.distance_to;
+    if (!(abs(along - sight.distance_to) <= width)) along = sight.distance_to;
+    float code = min(along * frame.codes_per_metre, 65533.0);
     return code <= float(surface_map_depth(place, pixel)) ? 1.0 : 0.0;
 }
 
 // Share of the point that is seen from the texel at `place`, whose map stands at `from`; 0 or 1 unfiltered.
-float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 point)
+float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 point, vec3 normal)
 {
     vec3 d = point - from;
-    float code = min(sqrt(dot(d, d)) * frame.codes_per_metre, 65533.0);
+    SurfaceMapSight sight = SurfaceMapSight(normal, dot(normal, d), sqrt(dot(d, d)));
     uint face = cube_face(d);
     uint resolution = frame.resolution;
     vec2 at = cube_place(d, face, resolution);
@@ -48,7 +67,7 @@ float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 
         if (frame.filter_mode == 1)
             at += unit_interval(pcg4d(uvec4(floatBitsToUint(point), place)).xy) - 0.5;
         uvec2 pixel = min(uvec2(max(at, vec2(0.0))), uvec2(resolution - 1));
-        return surface_pixel_seen(place, cube_pixel_index(face, pixel, resolution), code);
+        return surface_pixel_seen(frame, sight, place, cube_pixel_index(face, pixel, resolution));
     }
     // Percentage-closer filtering over the four pixels around; at a face's edge the outer ones count for the inner.
     at = clamp(at - 0.5, vec2(0.0), vec2(float(resolution) - 1.0));
@@ -58,7 +77,8 @@ float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 
     for (uint k = 0; k < 4; ++k) {
         uvec2 step = uvec2(k & 1, k >> 1);
         float weight = (step.x == 0 ? 1.0 - t.x : t.x) * (step.y == 0 ? 1.0 - t.y : t.y);
-        if (weight > 0.0) sum += weight * surface_pixel_seen(place, cube_pixel_index(face, low + step, resolution), code);
+        if (weight > 0.0)
+            sum += weight * surface_pixel_seen(frame, sight, place, cube_pixel_index(face, low + step, resolution));
     }
     return sum;
 }

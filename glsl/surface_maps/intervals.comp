@@ -7,7 +7,8 @@
 // the second.                                                                                    [Ritschel2008 3.2]
 // reads map_normals[place_count], hits, second_hits [chunk_count * 6 * resolution^2]
 // writes intervals (low | high << 16) of the same length   shared none
-// Differs from [Ritschel2008]: the bias stands in the intervals, so that it gives way where surfaces are close.
+// Differs from [Ritschel2008]: the bias stands in the intervals, so that it gives way where surfaces are close; it is small,
+// since queries compare along the pixel's own ray.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer MapNormals { vec3 map_normals[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Hits { Hit hits[]; };
@@ -40,10 +41,10 @@ void main()
     }
     float first = hits[i].t * params.codes_per_metre;
     float bias = params.bias * first * (2.0 / float(params.resolution));
-    float low = ceil(first + bias), high = 65535.0;
+    float low = ceil(first + bias) + 1.0, high = 65535.0;
     if (is_hit(second_hits[i])) {
         float second = second_hits[i].t * params.codes_per_metre;
-        high = floor(second - bias);
+        high = floor(second - bias) - 1.0;
         if (high < low) low = high = floor(0.5 * (first + second));
     }
     low = min(low, high == 65535.0 ? FARTHEST : high);

@@ -6,6 +6,7 @@
 // reads queries[query_count], map_origins[place_count] (m), run_offsets, runs   writes visibility[query_count] (0..1)   shared none
 struct SurfaceMapQuery {
     vec3 point;     // metres
+    vec3 normal;    // unit, of the surface there
     uint place;
 };
 layout(local_size_x = 64) in;
@@ -24,5 +25,5 @@ void main()
     uint i = linear_index();
     if (i >= params.query_count) return;
     uint place = queries[i].place;
-    visibility[i] = surface_map_visibility(params.frame, place, map_origins[place], queries[i].point);
+    visibility[i] = surface_map_visibility(params.frame, place, map_origins[place], queries[i].point, queries[i].normal);
 }

@@ -10,6 +10,7 @@ pub mod emitters;
 pub mod false_color;
 pub mod film;
 pub mod gather;
+pub mod hidden_parts;
 pub mod hierarchy;
 pub mod irradiance_vector;
 pub mod levels;

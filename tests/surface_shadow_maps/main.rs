@@ -3,5 +3,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod fixture;
+mod hidden;
 mod maps;
 mod solve;

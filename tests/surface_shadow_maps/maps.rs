@@ -66,7 +66,7 @@ fn queries_on_the_device_agree_with_the_intervals() {
             continue;
         }
         let point = origins[place as usize] + direction(pixel, resolution) * (code / maps.codes_per_metre);
-        queries.push(SurfaceMapQuery { point, place });
+        queries.push(SurfaceMapQuery { point, normal: direction(pixel, resolution), place });
         expected.push(f32::from(u8::from(is_seen)));
     }
     assert!(expected.iter().filter(|&&seen| seen == 0.0).count() > 1000);
@@ -100,7 +100,7 @@ fn drawn_pixels_are_the_filter_in_the_mean() {
             let place = random.below(atlas.texels.len() as u32);
             let other = origins[random.below(atlas.texels.len() as u32) as usize];
             let spread = Vec3::new(random.unit(), random.unit(), random.unit()) - 0.5;
-            SurfaceMapQuery { point: other + 0.2 * spread, place }
+            SurfaceMapQuery { point: other + 0.2 * spread, normal: spread.normalize(), place }
         })
         .collect();
     let buffer = context.upload("test/queries", &queries).unwrap();

@@ -1,5 +1,6 @@
 #version 460
 #include "lib/prelude.glsl"
+#include "lib/sender_gather.glsl"
 #include "lib/surface_map.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
@@ -16,7 +17,7 @@ uint surface_run(uint index) { return runs[index]; }
 float visibility(vec3 origin, vec3 target, uint leaf)
 {
     uint place = leaf_places[leaf];
-    return surface_map_visibility(map_frame[0], place, map_origins[place], origin);
+    return surface_map_visibility(map_frame[0], place, map_origins[place], origin, receiver.geometric);
 }
 
 #include "methods/surface_shadow_maps/gather.glsl"

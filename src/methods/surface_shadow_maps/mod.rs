@@ -28,6 +28,7 @@ use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
 use crate::scene::atlas::{Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
+use crate::stages::hidden_parts::{self, HiddenPartsError};
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
     MapFilter, MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
@@ -59,7 +60,7 @@ crate::settings! {
         /// How the texels are walked when maps are compressed.
         sequence: Sequence = Sequence::Spiral, paper "spiral is best";
         /// How far depths keep from the surfaces they tell apart.
-        map_bias: f32 = 1.0, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
+        map_bias: f32 = 0.05, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
         /// How look-ups are filtered between pixels of a map.
         map_filter: MapFilter = MapFilter::Drawn, paper "not given";
         /// What decides whether texels see each other.
@@ -86,6 +87,8 @@ crate::settings! {
 pub enum SurfaceShadowMapsError {
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    #[error(transparent)]
+    HiddenParts(#[from] HiddenPartsError),
     #[error(transparent)]
     Tree(#[from] SenderTreeError),
     #[error(transparent)]
@@ -169,8 +172,11 @@ impl std::fmt::Display for Report {
 impl SurfaceShadowMaps {
     /// Unwraps the scene, builds the tree and makes the maps.
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, SurfaceShadowMapsError> {
-        let atlas = make_atlas(stage, settings.atlas_resolution)?;
-        let texels = Texels::new(context, &atlas, stage.world, map_offset(stage.bounds))?;
+        let mut atlas = make_atlas(stage, settings.atlas_resolution)?;
+        let ray_offset = map_offset(stage.bounds);
+        let (geometry, positions) = (stage.geometry, stage.positions);
+        hidden_parts::leave_out(context, &stage.tracer, geometry, positions, &mut atlas, ray_offset, stage.watch)?;
+        let texels = Texels::new(context, &atlas, stage.world, ray_offset)?;
         let options = TreeOptions {
             normal_weight: settings.tree_normal_weight,
             layout: settings.tree_layout,

@@ -22,6 +22,11 @@ pub const MAX_RESOLUTION: u32 = 2048;
 /// Texels that a chart has in the mean, at least, where the resolution is not given.
 const TEXELS_PER_CHART: usize = 3;
 
+/// Cells a side that a texel is cut into: what is hidden of it is told cell by cell.
+fn cells_a_side(resolution: u32) -> u32 {
+    (1024 / resolution.max(1)).clamp(1, 4)
+}
+
 /// Why a surface has no atlas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AtlasError {
@@ -52,7 +57,7 @@ pub struct Texel {
     pub first_part: u32,
 }
 
-/// The part of one triangle in one texel.
+/// The part of one triangle in one cell of a texel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TexelPart {
     pub triangle: u32,
@@ -60,6 +65,9 @@ pub struct TexelPart {
     pub barycentrics: Vec2,
     /// m2.
     pub area: f32,
+    /// Its centroid and its mean squared coordinates, in texels from the texel's corner.
+    local: Vec2,
+    squares: Vec2,
 }
 
 /// The atlas as plain data.
@@ -72,6 +80,7 @@ pub struct Atlas {
     pub chart_count: u32,
     /// Row by row.
     pub texels: Vec<Texel>,
+    /// In the order of their texels.
     pub parts: Vec<TexelPart>,
     /// Index of the texel at each place, row by row, or [`NO_TEXEL`].
     pub texel_at: Vec<u32>,
@@ -137,6 +146,7 @@ impl Atlas {
         let count = charts.charts.len() as u32;
         let mut atlas = Self { resolution, scale: packing.scale, chart_count: count, ..Self::default() };
         // Sums per place of the square; a place belongs to one chart, since charts keep apart.
+        let cells = cells_a_side(resolution);
         let mut found: Vec<Found> = Vec::new();
         for (triangle, corners) in geometry.triangles.iter().enumerate() {
             let chart = charts.triangle_chart[triangle] as usize;
@@ -154,35 +164,80 @@ impl Atlas {
                 if flat == 0.0 || area <= 0.0 {
                     continue;
                 }
-                raster::cover(places, |covered| {
-                    let at = covered.texel.min(UVec2::splat(resolution - 1));
-                    let offset = covered.centre - p;
+                raster::cover(places.map(|place| place * cells as f32), |covered| {
+                    let at = (covered.texel / cells).min(UVec2::splat(resolution - 1));
+                    let offset = covered.centre / cells as f32 - p;
                     let barycentrics = Vec2::new(offset.perp_dot(r - p), (q - p).perp_dot(offset)) / flat;
+                    let (corner, size) = (covered.texel.as_vec2(), cells as f32);
+                    // Moments about the cell's corner, moved to the texel's.
+                    let cell = corner - at.as_vec2() * size;
+                    let squares =
+                        (cell * cell + 2.0 * cell * (covered.centre - corner) + covered.squares) / (size * size);
                     let part = TexelPart {
                         triangle: triangle as u32,
                         barycentrics,
-                        area: covered.share / (0.5 * flat.abs()) * area,
+                        area: covered.share / (0.5 * flat.abs() * size * size) * area,
+                        local: covered.centre / size - at.as_vec2(),
+                        squares,
                     };
-                    let local = covered.centre - covered.texel.as_vec2();
-                    found.push(Found { place: at.y * resolution + at.x, chart, part, local, squares: covered.squares });
+                    found.push(Found { place: at.y * resolution + at.x, chart, part });
                 });
             }
         }
         found.sort_by_key(|found| found.place);
 
         atlas.texel_at = vec![NO_TEXEL; resolution as usize * resolution as usize];
-        for parts in found.chunk_by(|a, b| a.place == b.place) {
-            let Found { place, chart, .. } = parts[0];
-            let is_back = chart >= count;
-            let texel =
-                texel(geometry, positions, &atlas, parts, is_back, UVec2::new(place % resolution, place / resolution));
-            if texel.area > 0.0 && texel.normal != Vec3::ZERO {
-                atlas.texel_at[place as usize] = atlas.texels.len() as u32;
-                atlas.texels.push(Texel { chart, first_part: atlas.parts.len() as u32, ..texel });
-                atlas.parts.extend(parts.iter().map(|found| found.part));
-            }
+        for found in found.chunk_by(|a, b| a.place == b.place) {
+            let parts: Vec<TexelPart> = found.iter().map(|found| found.part).collect();
+            let at = UVec2::new(found[0].place % resolution, found[0].place / resolution);
+            atlas.push_texel(geometry, positions, &parts, (at, found[0].chart), false);
         }
         atlas
+    }
+
+    /// Appends the texel of `parts` at a place of a chart, if it has area.
+    fn push_texel(
+        &mut self,
+        geometry: &Geometry,
+        positions: &[Vec3],
+        parts: &[TexelPart],
+        (at, chart): (UVec2, u32),
+        is_cut: bool,
+    ) {
+        let is_back = chart >= self.chart_count;
+        let texel = texel(geometry, positions, self, parts, is_back, at, is_cut);
+        if texel.area > 0.0 && texel.normal != Vec3::ZERO {
+            self.texel_at[(at.y * self.resolution + at.x) as usize] = self.texels.len() as u32;
+            self.texels.push(Texel { chart, first_part: self.parts.len() as u32, ..texel });
+            self.parts.extend(parts);
+        }
+    }
+
+    /// Where each part stands in space (metres), and the unit normal of its side: what a test of each starts from.
+    pub fn part_points(&self, geometry: &Geometry, positions: &[Vec3]) -> (Vec<Vec3>, Vec<Vec3>) {
+        let of_texel = |index: usize| {
+            let sign = if self.texels[index].chart >= self.chart_count { -1.0 } else { 1.0 };
+            self.parts_of(index).iter().map(move |part| {
+                let [a, b, c] = geometry.triangles[part.triangle as usize].map(|vertex| positions[vertex as usize]);
+                (part_point(geometry, positions, part), sign * (b - a).cross(c - a).normalize_or_zero())
+            })
+        };
+        (0..self.texels.len()).flat_map(of_texel).unzip()
+    }
+
+    /// Leaves out all parts that are not `kept`; texels shrink to what is left of them, and those without any are gone.
+    pub fn keep_parts(&mut self, geometry: &Geometry, positions: &[Vec3], kept: &[bool]) {
+        let old = Self { texel_at: vec![NO_TEXEL; self.texel_at.len()], ..self.clone() };
+        self.texel_at.fill(NO_TEXEL);
+        self.texels.clear();
+        self.parts.clear();
+        for (index, texel) in old.texels.iter().enumerate() {
+            let parts = old.parts_of(index);
+            let first = texel.first_part as usize;
+            let left: Vec<TexelPart> =
+                parts.iter().zip(&kept[first..]).filter(|(_, kept)| **kept).map(|(part, _)| *part).collect();
+            self.push_texel(geometry, positions, &left, (texel.at, texel.chart), left.len() < parts.len());
+        }
     }
 
     /// Parts of a texel.
@@ -198,26 +253,36 @@ struct Found {
     place: u32,
     chart: u32,
     part: TexelPart,
-    /// Its centroid and its mean squared coordinates, in texels from the texel's corner.
-    local: Vec2,
-    squares: Vec2,
+}
+
+fn part_point(geometry: &Geometry, positions: &[Vec3], part: &TexelPart) -> Vec3 {
+    let [a, b, c] = geometry.triangles[part.triangle as usize].map(|vertex| positions[vertex as usize]);
+    a + part.barycentrics.x * (b - a) + part.barycentrics.y * (c - a)
 }
 
 /// Sums the parts up: area, centroid, mean normal, and the mean of what a step of a texel to the right and down is in
-/// space.
-fn texel(geometry: &Geometry, positions: &[Vec3], atlas: &Atlas, parts: &[Found], is_back: bool, at: UVec2) -> Texel {
+/// space. Where parts were cut away the texel stands on the part nearest to the centroid: that itself may be hidden.
+fn texel(
+    geometry: &Geometry,
+    positions: &[Vec3],
+    atlas: &Atlas,
+    parts: &[TexelPart],
+    is_back: bool,
+    at: UVec2,
+    is_cut: bool,
+) -> Texel {
     let (mut area, mut position, mut normal, mut u, mut v) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let (mut local, mut squares) = (Vec2::ZERO, Vec2::ZERO);
-    for Found { part, local: part_local, squares: part_squares, .. } in parts {
-        local += part.area * part_local;
-        squares += part.area * part_squares;
+    for part in parts {
+        local += part.area * part.local;
+        squares += part.area * part.squares;
         let triangle = part.triangle as usize;
         let [a, b, c] = geometry.triangles[triangle].map(|vertex| positions[vertex as usize]);
         let [p, q, r] = atlas.corner_places[usize::from(is_back)][triangle];
         let (e1, e2) = (q - p, r - p);
         let flat = e1.perp_dot(e2);
         area += part.area;
-        position += part.area * (a + part.barycentrics.x * (b - a) + part.barycentrics.y * (c - a));
+        position += part.area * part_point(geometry, positions, part);
         normal += part.area * (b - a).cross(c - a).normalize_or_zero();
         u += part.area * ((b - a) * e2.y - (c - a) * e1.y) / flat;
         v += part.area * ((c - a) * e1.x - (b - a) * e2.x) / flat;
@@ -240,15 +305,13 @@ fn texel(geometry: &Geometry, positions: &[Vec3], atlas: &Atlas, parts: &[Found]
         let (u, v) = normal.any_orthonormal_pair();
         (area.sqrt() * u, area.sqrt() * v)
     };
-    // On a curved surface the centroid lies under it, and would be hidden by it: out to the part that stands highest.
+    let points = || parts.iter().map(|part| part_point(geometry, positions, part));
     let centroid = position / area;
-    let height = |found: &Found| {
-        let [a, b, c] = geometry.triangles[found.part.triangle as usize].map(|vertex| positions[vertex as usize]);
-        let at = a + found.part.barycentrics.x * (b - a) + found.part.barycentrics.y * (c - a);
-        (at - centroid).dot(normal)
-    };
-    let position = centroid + parts.iter().map(height).fold(0.0, f32::max) * normal;
-    Texel { at, chart: 0, position, normal, area, side_u, side_v, first_part: 0 }
+    let nearest = |a: Vec3, b: Vec3| if b.distance_squared(centroid) < a.distance_squared(centroid) { b } else { a };
+    let stand = if is_cut { points().reduce(nearest).unwrap_or(centroid) } else { centroid };
+    // On a curved surface the centroid lies under it, and would be hidden by it: out to the part that stands highest.
+    let height = points().map(|point| (point - stand).dot(normal)).fold(0.0, f32::max);
+    Texel { at, chart: 0, position: stand + height * normal, normal, area, side_u, side_v, first_part: 0 }
 }
 
 #[cfg(test)]

@@ -1,0 +1,91 @@
+//! What of an atlas nobody can see: parts of texels that lie inside other things, as a wall does behind its skirting.
+//!
+//! From each part a few rays look around. Where most end at the backs of one-sided surfaces, the part is inside of
+//! something: it takes no light and sends none. A texel keeps the parts that are left, and stands on one of them, so that
+//! what is asked from a texel is asked from where there is light.
+//!
+//! What it does not do: the backs of two-sided surfaces tell nothing, so what lies inside of such things stays.
+
+use super::trace::{self, Tracer};
+use super::work::{Interrupted, Watch};
+use crate::gpu::shaders::atlas as passes;
+use crate::gpu::shaders::types::{Hit, Ray};
+use crate::gpu::{Buffer, Context, GpuError};
+use crate::scene::atlas::Atlas;
+use crate::scene::geometry::Geometry;
+use glam::Vec3;
+
+/// Rays that look around from each part.
+const SAMPLES: u32 = 8;
+/// Of those, as many that end at backs make a part hidden.
+const HIDDEN_FROM: u32 = SAMPLES / 2 + 1;
+/// Parts of a batch.
+const BATCH_PARTS: u32 = 1 << 16;
+
+/// Why it cannot be told.
+#[derive(Debug, thiserror::Error)]
+pub enum HiddenPartsError {
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+}
+
+/// Leaves the hidden parts out of `atlas`; returns how many they were. `ray_offset` is how far rays start off the surface,
+/// metres.
+pub fn leave_out(
+    context: &Context,
+    tracer: &Tracer<'_>,
+    geometry: &Geometry,
+    positions: &[Vec3],
+    atlas: &mut Atlas,
+    ray_offset: f32,
+    watch: &dyn Watch,
+) -> Result<usize, HiddenPartsError> {
+    let (points, normals) = atlas.part_points(geometry, positions);
+    let back_hits = back_hits(context, tracer, (&points, &normals), ray_offset, watch)?;
+    let kept: Vec<bool> = back_hits.iter().map(|&hits| hits < HIDDEN_FROM).collect();
+    let hidden = kept.iter().filter(|kept| !**kept).count();
+    if hidden > 0 {
+        atlas.keep_parts(geometry, positions, &kept);
+    }
+    Ok(hidden)
+}
+
+/// Of each point (metres, with its unit normal), how many of its rays end at the back of a one-sided surface.
+fn back_hits(
+    context: &Context,
+    tracer: &Tracer<'_>,
+    (points, normals): (&[Vec3], &[Vec3]),
+    ray_offset: f32,
+    watch: &dyn Watch,
+) -> Result<Vec<u32>, HiddenPartsError> {
+    let part_count = points.len() as u32;
+    let ray_count = (part_count.min(BATCH_PARTS) * SAMPLES) as usize;
+    let points = context.upload("hidden parts/points", points)?;
+    let normals = context.upload("hidden parts/normals", normals)?;
+    let back_hits = context.buffer("hidden parts/back hits", part_count as usize)?;
+    let rays: Buffer<Ray> = context.buffer("hidden parts/rays", ray_count)?;
+    let hits: Buffer<Hit> = context.buffer("hidden parts/hits", ray_count)?;
+    let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = tracer;
+    for first_part in (0..part_count).step_by(BATCH_PARTS as usize) {
+        watch.step("hidden parts", first_part.into(), part_count.into())?;
+        let batch_count = BATCH_PARTS.min(part_count - first_part);
+        let mut recorder = context.recorder("hidden parts")?;
+        let params = passes::PartRaysParams { first_part, batch_count, sample_count: SAMPLES, ray_offset };
+        let pass = passes::PartRays { points: &points, normals: &normals, rays: &rays, params };
+        recorder.dispatch(&pass, batch_count * SAMPLES);
+        trace::closest_hit(&mut recorder, tracer, &rays, &hits, (batch_count * SAMPLES) as usize);
+        let pass = passes::PartHits {
+            hits: &hits,
+            triangle_materials: surfaces.triangle_materials,
+            materials: surfaces.materials,
+            back_hits: &back_hits,
+            params: passes::PartHitsParams { first_part, batch_count, sample_count: SAMPLES },
+        };
+        recorder.dispatch(&pass, batch_count);
+        recorder.submit()?;
+    }
+    watch.step("hidden parts", part_count.into(), part_count.into())?;
+    Ok(context.download(&back_hits)?)
+}
