@@ -43,7 +43,7 @@ fn profile_trace_and_table_agree_about_a_frame() {
 
     let scene = SceneFacts { name: "furnace".into(), triangles: 12, elements: 8, lights: 0 };
     let mut table = Vec::new();
-    let measured = Measured { context: &context, time_line: &time_line, records, scene };
+    let measured = Measured { context: &context, time_line: &time_line, records, scene, method: serde_json::json!({"transfers": 7}) };
     write_measurements(&request, measured, &mut table).unwrap();
 
     let profile = Profile::read(&folder.path().join("p.json")).unwrap();
@@ -52,6 +52,7 @@ fn profile_trace_and_table_agree_about_a_frame() {
     assert!(first_path.starts_with("frame/offsets/"), "{first_path}");
     assert_eq!((&profile.settings["bounces"], profile.scene.triangles), (&4.into(), 12));
     assert!(profile.passes.iter().all(|pass| pass.bytes_read > 0 && pass.ms.total > 0.0), "{:?}", profile.passes);
+    assert_eq!(profile.method["transfers"], 7);
     let owners: Vec<&str> = profile.memory.owners.iter().map(|owner| owner.owner.as_str()).collect();
     assert!(owners.contains(&"scene") && owners.contains(&"scan"), "{owners:?}");
     assert!(profile.memory.peak_bytes >= 4 * len as u64);

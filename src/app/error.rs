@@ -26,6 +26,9 @@ pub enum AppError {
     /// The user stopped the work; exit code 1.
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+    /// The user stopped the work when some of it could already be shown; exit code 1.
+    #[error("interrupted after {0}; the picture shows the light until then")]
+    Partial(String),
     /// No usable GPU; exit code 3.
     #[error(transparent)]
     NoGpu(GpuError),
@@ -43,7 +46,7 @@ impl AppError {
     /// The process's exit code.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Failed(_) | Self::AboveLimit(_) | Self::Interrupted(_) | Self::Output(_) => 1,
+            Self::Failed(_) | Self::AboveLimit(_) | Self::Interrupted(_) | Self::Partial(_) | Self::Output(_) => 1,
             Self::Usage(_) => 2,
             Self::NoGpu(_) => 3,
         }

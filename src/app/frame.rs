@@ -15,7 +15,7 @@ use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{self, ExplicitVisibility};
-use crate::methods::face_cluster::{self, FaceClusters};
+use crate::methods::face_cluster::{self, FaceClusterError, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
@@ -24,6 +24,7 @@ use crate::stages::film::Film;
 use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
 use glam::UVec2;
+use serde_json::Value;
 use std::path::Path;
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
@@ -184,7 +185,15 @@ impl Method {
         }
     }
 
-    /// One frame into `film`.
+    /// What the method counted, by its own names.
+    pub fn report(&self) -> Result<Value, AppError> {
+        match self {
+            Self::FaceClusters(shown) => Ok(serde_json::to_value(shown.method.report())?),
+            _ => Ok(Value::Null),
+        }
+    }
+
+    /// One frame into `film`. Where the user ends it early, [`AppError::Partial`] says that the film holds a part.
     pub fn frame(
         &mut self,
         context: &Context,
@@ -248,8 +257,22 @@ impl Method {
             Self::OnTexels(shown) => shown.frame(context, request, stage, film, watch),
             Self::FaceClusters(shown) => {
                 let FaceClustersShown { method, shadow_maps, g_buffer } = &mut **shown;
-                method.solve(context, &cluster_stage(stage, None, watch), request.bounces).map_err(AppError::failed)?;
+                let solved = method.solve(context, &cluster_stage(stage, None, watch), request.bounces);
+                let partial = match solved {
+                    Err(FaceClusterError::Interrupted(interrupted)) => {
+                        // Whole passes of light can be shown; what was under way is dropped.
+                        let last = method.report().iterations.last().ok_or(interrupted)?;
+                        let after = format!("{} of {} bounces", last.name, request.bounces);
+                        method.locate(context, &cluster_stage(stage, None, watch)).map_err(AppError::failed)?;
+                        Some(AppError::Partial(after))
+                    }
+                    other => {
+                        other.map_err(AppError::failed)?;
+                        None
+                    }
+                };
                 tracing::info!("{}", method.report());
+                method.report().iterations.iter().for_each(|iteration| tracing::debug!("{iteration}"));
                 let colors = method.colors(context).map_err(AppError::failed)?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
@@ -258,7 +281,7 @@ impl Method {
                     irradiance_vector::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });
                 recorder.submit()?;
-                Ok(())
+                partial.map_or(Ok(()), Err)
             }
         }
     }

@@ -40,6 +40,8 @@ pub struct Measured<'a> {
     /// Passes of the measured frames, in submission order.
     pub records: Vec<gpu::PassRecord>,
     pub scene: SceneFacts,
+    /// What the method counted.
+    pub method: Value,
 }
 
 /// Write the profile and the trace that were asked for, and print the table of passes to `out`.
@@ -63,7 +65,8 @@ pub fn write_measurements(
         .collect();
         trace::write(path, &measured.time_line.spans(), &records, clock, &about)?;
     }
-    let profile = Profile::new(device, measured.scene, settings, request.frames, &records, memory);
+    let mut profile = Profile::new(device, measured.scene, settings, request.frames, &records, memory);
+    profile.method = measured.method;
     if let Some(path) = &request.profile {
         profile.write(path)?;
     }

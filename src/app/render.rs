@@ -264,13 +264,20 @@ pub fn run(
     let film = Film::new(&context, request.width, request.height)?;
     let watch = Watcher::new(console, interrupt);
     let mut method = time_line.span("prepare method", || frame::Method::prepare(&context, request, &stage, &watch))?;
+    let mut partial = None;
     for number in 0..request.frames {
         interrupt.check()?;
         if let (Some(capture), true) = (&mut capture, number + 1 == request.frames) {
             capture.start();
         }
         let name = format!("frame {number}");
-        time_line.span(&name, || method.frame(&context, request, &stage, &film, &watch))?;
+        match time_line.span(&name, || method.frame(&context, request, &stage, &film, &watch)) {
+            Err(error @ AppError::Partial(_)) => {
+                partial = Some(error);
+                break;
+            }
+            other => other?,
+        }
     }
     if let Some(capture) = capture {
         time_line.span("write capture", || capture.finish())?;
@@ -278,13 +285,14 @@ pub fn run(
     let records = context.take_records();
     let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;
     time_line.span("write picture", || output::write_picture(request, picture, context.info()))?;
-    let measured = Measured { context: &context, time_line: &time_line, records, scene: stage.facts() };
+    let measured = Measured { context: &context, time_line: &time_line, records, scene: stage.facts(), method: method.report()? };
     if global.verbosity() >= Verbosity::Detailed {
         output::write_measurements(request, measured, out)?;
     } else {
         output::write_measurements(request, measured, &mut io::sink())?;
     }
-    check_validation(&context)
+    check_validation(&context)?;
+    partial.map_or(Ok(()), Err)
 }
 
 /// The device of the global options; `statistics` counts what each pass does.

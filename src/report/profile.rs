@@ -22,6 +22,7 @@
 //! | `passes[].bytes_read`, `bytes_written` | sum over calls, as counted from the algorithm (not from the hardware) |
 //! | `passes[].counters` | object: sum over calls, by name (`links made`, `nodes visited` ...) |
 //! | `passes[].overlapped` | `true` if any call ran beside another pass: its times share the GPU |
+//! | `method` | what the method counted, by its own names; `null` where it counts nothing |
 //! | `total_ms` | sum of all passes, milliseconds |
 //! | `memory` | `{bytes, peak_bytes, owners: [{owner, bytes, peak_bytes}]}`: GPU memory, largest peak first; the total peak is the sum of the owners', an upper bound |
 //!
@@ -66,6 +67,9 @@ pub struct Profile {
     pub settings: Map<String, Value>,
     pub frames: u32,
     pub passes: Vec<Pass>,
+    /// What the method counted.
+    #[serde(default)]
+    pub method: Value,
     pub total_ms: f64,
     pub memory: Memory,
 }
@@ -170,6 +174,7 @@ impl Profile {
             settings,
             frames,
             passes,
+            method: Value::Null,
             total_ms,
             memory,
         }

@@ -13,6 +13,7 @@ pub mod gather;
 pub mod hidden_parts;
 pub mod hierarchy;
 pub mod irradiance_vector;
+pub mod kept;
 pub mod levels;
 pub mod links;
 pub mod pair_queue;

@@ -246,3 +246,27 @@ fn clusters_block_about_as_rays_do() {
     println!("cornell box: {rays} W received by rays, {clusters} W by clusters");
     assert!((clusters / rays - 1.0).abs() < 0.03, "{clusters} W by clusters, {rays} W by rays");
 }
+
+/// A closed cube of side 2 with a lamp in its ceiling: all that is shot arrives, whatever the bounce.
+#[test]
+fn diagnose_closed() {
+    let context = TestContext::new();
+    let wall = |corner: Vec3, u: Vec3, v: Vec3, material| parallelogram(corner, u, v, 16, material);
+    let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
+    let mut materials = vec![one_sided(0.7), one_sided(0.7)];
+    materials[1].emission = Vec3::splat(10.0);
+    let walls = vec![
+        wall(Vec3::ZERO, x, y, 0), wall(z, y, x, 0), wall(Vec3::ZERO, y, z, 0), wall(x, z, y, 0), wall(Vec3::ZERO, z, x, 0), wall(y, x, z, 0),
+        parallelogram(Vec3::new(0.7, 1.4, 0.7), Vec3::X * 0.6, Vec3::Z * 0.6, 4, 1),
+        parallelogram(Vec3::new(0.7, 1.4, 0.7), Vec3::Z * 0.6, Vec3::X * 0.6, 4, 1),
+    ];
+    let _ = walls.len();
+    let fixture = Fixture::new(&context, scene(materials, walls, &[]), None);
+    for (threshold, basis) in [(1e-4, Basis::Linear), (1e-5, Basis::Linear), (1e-6, Basis::Linear), (1e-4, Basis::Constant), (1e-5, Basis::Constant)] {
+        let settings = Settings { threshold, irradiance_basis: basis, convergence: 0.0, ..Settings::default() };
+        let method = fixture.solve(&context, settings, 3);
+        for i in &method.report().iterations {
+            println!("{threshold:e} {basis:?} {}: received/shot {:.5}, {i}", i.name, i.received[0] / i.shot.unwrap()[0]);
+        }
+    }
+}

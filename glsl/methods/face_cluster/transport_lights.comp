@@ -59,7 +59,11 @@ void main()
         free[r] = share;
     }
     atomicAdd(pool[0].rays, is_small ? 1 : RECEIVER_NODES);
-    if (!any_free) return;
+    if (!any_free) {
+        // As in transport: what may still be free is looked for where it is too much to lose.
+        if (can_split(a) && a.most_albedo * greatest_of_all > params.threshold * float(RECEIVER_NODES + 2)) decisions[i] = SPLIT_RECEIVER;
+        return;
+    }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         float share = free[is_small ? turn : r];
         at_nodes[r] *= share;

@@ -22,7 +22,7 @@ use crate::report::errors::compare;
 use crate::report::image::{self, Metadata, Picture};
 use crate::report::tonemap::ToneSettings;
 use crate::report::{heat_map, write};
-use crate::stages::work::Watch;
+use crate::stages::work::{Interrupted, Watch};
 
 pub use plan::Variation;
 use plan::{Plan, REFERENCE, Run};
@@ -171,6 +171,7 @@ impl Session<'_> {
                         .extend(failed.map(|limit| format!("`{}`: {}", run.command, complaint(limit, &done.figures))));
                     Outcome::Done(Box::new(done))
                 }
+                Err(AppError::Partial(_)) => return Err(Interrupted.into()),
                 Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => return Err(error),
                 Err(error) => {
                     // The user's Ctrl-C may come wrapped in an error of the work it ended.

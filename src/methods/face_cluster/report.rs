@@ -40,6 +40,9 @@ pub struct Iteration {
     pub rays: u32,
     /// Elements after it.
     pub elements: u32,
+    /// What all shooters sent and all leaves received, W; the difference escaped. Lights at a distance send no known power.
+    pub shot: Option<[f64; 3]>,
+    pub received: [f64; 3],
     /// What is left to shoot, W/m2.
     pub largest_unshot: f32,
     pub seconds: f64,
@@ -67,33 +70,30 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "face clusters: {} of {} triangles in {} trees ({} instances), {:.1} MB, {} levels, {:.2} s",
-            self.clusters,
-            self.triangles,
-            self.trees,
-            self.instances,
-            self.cluster_bytes as f64 / 1e6,
-            self.tree_depth,
-            self.clustering_seconds
-        )?;
-        for i in &self.iterations {
-            writeln!(
-                f,
-                "  {}: {} pairs, {} transfers, {} rays, {} elements, {:.3e} W/m2 unshot, {:.2} s",
-                i.name, i.pairs, i.transfers, i.rays, i.elements, i.largest_unshot, i.seconds
-            )?;
-        }
         write!(
             f,
-            "{} elements, {} of them leaves, {} levels; {:.2} MB of solution, {:.2} MB of scratch; {:.2} s",
+            "{} clusters of {} triangles ({:.1} MB, {} levels, {:.2} s); {} elements, {} of them leaves, {} transfers, \
+             {:.2} MB of solution, {:.2} s",
+            self.clusters,
+            self.triangles,
+            self.cluster_bytes as f64 / 1e6,
+            self.tree_depth,
+            self.clustering_seconds,
             self.elements,
             self.leaves,
-            self.element_depth,
+            self.transfers(),
             self.solution_bytes as f64 / 1e6,
-            self.scratch_bytes as f64 / 1e6,
             self.solve_seconds
+        )
+    }
+}
+
+impl fmt::Display for Iteration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}: {} pairs, {} transfers, {} rays, {} elements, {:.3e} W/m2 unshot, {:.2} s",
+            self.name, self.pairs, self.transfers, self.rays, self.elements, self.largest_unshot, self.seconds
         )
     }
 }

@@ -1,12 +1,13 @@
 //! One pass of light: pairs refined and transported, what arrived pushed to the leaves, reflected, and pulled up.
 
+use super::placement::NO_ELEMENT;
 use super::report::Iteration;
 use super::shooting::{IS_LIGHT, Kept, LightPass, Shooters};
 use super::{FaceClusterError, FaceClusters, SEEDS, Stage, Visibility};
 use crate::gpu::shaders::methods::face_cluster as passes;
 use crate::gpu::shaders::types::{PairCounters, PoolCounters};
 use crate::gpu::{Context, Recorder};
-use glam::UVec2;
+use glam::{DVec3, UVec2};
 use std::time::Instant;
 
 /// Whole units of the most that can arrive: five bits of room to the largest i32.
@@ -23,6 +24,10 @@ impl FaceClusters {
         pass: &LightPass<'_>,
     ) -> Result<(), FaceClusterError> {
         let clock = Instant::now();
+        let shot = match pass.shooters {
+            Shooters::Lights(..) => None,
+            Shooters::Emission | Shooters::Unshot => Some(self.shot(context)?),
+        };
         let mut counters = context.download(&self.state.pool)?[0];
         (counters.transfers, counters.rays, counters.largest_unshot) = (0, 0, 0);
         context.write(&self.state.pool, &[counters])?;
@@ -39,12 +44,15 @@ impl FaceClusters {
         self.settle(context, pass.kept, 1.0 / units, &counters)?;
 
         let counters = context.download(&self.state.pool)?[0];
+        let received = self.received(context, counters.element_count as usize)?;
         self.report.iterations.push(Iteration {
             name: pass.name.clone(),
             pairs,
             transfers: counters.transfers,
             rays: counters.rays,
             elements: counters.element_count,
+            shot,
+            received,
             largest_unshot: f32::from_bits(counters.largest_unshot),
             seconds: clock.elapsed().as_secs_f64(),
         });
@@ -239,6 +247,30 @@ impl FaceClusters {
             },
         };
         recorder.dispatch_indirect(&inherit, &queue.groups, 0);
+    }
+
+    /// What the roots are about to send, W per channel.
+    fn shot(&self, context: &Context) -> Result<[f64; 3], FaceClusterError> {
+        let roots = self.placement.instance_count as usize;
+        let functions = self.settings.radiosity_basis.functions() as usize;
+        let elements = context.download_range(&self.state.elements, 0..roots)?;
+        let unshot = context.download_range(&self.state.unshot, 0..roots * functions)?;
+        let power = elements.iter().zip(unshot.iter().step_by(functions));
+        Ok(power.map(|(e, b)| f64::from(e.area) * b.as_dvec3()).sum::<DVec3>().to_array())
+    }
+
+    /// What arrived at the leaves in the pass that was just settled, W per channel.
+    fn received(&self, context: &Context, count: usize) -> Result<[f64; 3], FaceClusterError> {
+        let functions = self.settings.irradiance_basis.functions() as usize;
+        let elements = context.download_range(&self.state.elements, 0..count)?;
+        let arrived = context.download_range(&self.state.arriving, 0..count * functions * 9)?;
+        let leaves = elements.iter().zip(arrived.chunks(9 * functions)).filter(|(e, _)| e.children == NO_ELEMENT);
+        let power = leaves.map(|(e, words)| {
+            let normal = e.axis_z * (e.facing[4] - e.facing[5]).max(0.0);
+            let along = |c: usize| (0..3).map(|k| normal[k] * f32::from_bits(words[3 * c + k] as u32)).sum::<f32>();
+            DVec3::new(along(0).into(), along(1).into(), along(2).into())
+        });
+        Ok(power.sum::<DVec3>().to_array())
     }
 
     /// Pushes down to the leaves, reflects, and pulls up.                                   [Gobbetti2003 3.3.4]

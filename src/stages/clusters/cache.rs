@@ -1,10 +1,12 @@
 //! Cluster trees kept between runs: one file per mesh, named by what it was made of.
 //!
 //! A file holds a header, the table and its hash; it is written aside and renamed. What is damaged, of another version
-//! or cannot be read is as good as not there: the tree is built again. Nothing is ever deleted.
+//! or cannot be read is as good as not there: the tree is built again. Files not used for longest make room for new ones
+//! ([`kept`]).
 
 use super::{ClusterTree, MeshFaces};
 use crate::gpu::shaders::types::FaceCluster;
+use crate::stages::kept;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -40,6 +42,7 @@ pub fn tree(mesh: &MeshFaces<'_>, folder: Option<&Path>) -> ClusterTree {
     };
     let path = path_of(folder, mesh);
     if let Some(tree) = std::fs::read(&path).ok().and_then(|bytes| decode(&bytes, mesh.triangles.len())) {
+        kept::used(&path);
         return tree;
     }
     let tree = ClusterTree::build(mesh);
@@ -59,6 +62,7 @@ fn write(folder: &Path, path: &Path, tree: &ClusterTree) -> std::io::Result<()> 
     let mut file = tempfile::NamedTempFile::new_in(folder)?;
     file.write_all(&encode(tree))?;
     file.persist(path)?;
+    kept::make_room(folder, ["", ".clusters"], path, kept::MOST_BYTES);
     Ok(())
 }
 

@@ -2,6 +2,7 @@
 
 use super::compress::{CompressedMaps, Run};
 use crate::report::write::{FileError, write_whole};
+use crate::stages::kept;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -40,19 +41,25 @@ pub enum Found {
 
 /// Reads the maps of `key`, checked against their checksum and for sense.
 pub fn read(folder: &Path, key: &Key) -> Found {
-    let Ok(bytes) = std::fs::read(key.file_in(folder)) else { return Found::Nothing };
+    let path = key.file_in(folder);
+    let Ok(bytes) = std::fs::read(&path) else { return Found::Nothing };
     match decode(&bytes, key) {
-        Ok(maps) => Found::Maps(maps),
+        Ok(maps) => {
+            kept::used(&path);
+            Found::Maps(maps)
+        }
         Err(reason) => Found::Damaged(reason),
     }
 }
 
-/// Writes the maps of `key`; a reader finds all of them or none.
+/// Writes the maps of `key`; a reader finds all of them or none. Files not used for longest make room.
 pub fn write(folder: &Path, key: &Key, maps: &CompressedMaps) -> Result<(), FileError> {
     std::fs::create_dir_all(folder).map_err(|source| FileError::new("make the folder", folder, source))?;
     let path = key.file_in(folder);
     let body = encode(key, maps);
-    write_whole(&path, |writer| writer.write_all(&body).map_err(|source| FileError::new("write", &path, source)))
+    write_whole(&path, |writer| writer.write_all(&body).map_err(|source| FileError::new("write", &path, source)))?;
+    kept::make_room(folder, ["surface-maps-", ".bin"], &path, kept::MOST_BYTES);
+    Ok(())
 }
 
 /// Magic, version, key, counts, offsets, runs; all after the checksum of it.
