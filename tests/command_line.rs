@@ -361,3 +361,38 @@ fn an_interrupt_ends_the_work_and_leaves_files_alone() {
         assert_eq!(std::fs::read(folder.path("out.exr")).unwrap(), b"as before", "{work}");
     }
 }
+
+/// Face-cluster radiosity can show what was shot before Ctrl-C: the picture is written, and the exit code says 1.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_shooting_is_shown() {
+    use std::io::{BufRead as _, BufReader, Read as _};
+
+    let folder = Pictures::new();
+    let mut child = program()
+        .args(["render", "builtin:cornell-box", "-v", "-o", &folder.text("out.png"), "--method", "face-cluster"])
+        .args(["--size", "32x32", "--spp", "1", "--bounces", "64", "--set", "convergence=0"])
+        .args(["--profile", &folder.text("p.json")])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut log = BufReader::new(child.stderr.take().unwrap());
+    let mut line = String::new();
+    while !line.contains("direct: ") {
+        line.clear();
+        assert!(log.read_line(&mut line).unwrap() > 0, "ended before it began");
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let mut rest = String::new();
+    log.read_to_string(&mut rest).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(1), "{rest}");
+    assert!(rest.contains("the picture shows the light until then"), "{rest}");
+    let picture = ::image::open(folder.path("out.png")).unwrap().to_rgb8();
+    assert!(picture.pixels().filter(|p| p.0.iter().any(|&c| c > 20)).count() > 500, "the picture is lit");
+    let profile: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path("p.json")).unwrap()).unwrap();
+    let passes = profile["method"]["iterations"].as_array().unwrap();
+    assert!((1..64).contains(&passes.len()) && passes[0]["name"] == "direct", "{passes:?}");
+    assert!(passes.iter().all(|pass| pass["transfers"].as_u64().unwrap() > 0), "{passes:?}");
+}

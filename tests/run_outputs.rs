@@ -43,7 +43,13 @@ fn profile_trace_and_table_agree_about_a_frame() {
 
     let scene = SceneFacts { name: "furnace".into(), triangles: 12, elements: 8, lights: 0 };
     let mut table = Vec::new();
-    let measured = Measured { context: &context, time_line: &time_line, records, scene, method: serde_json::json!({"transfers": 7}) };
+    let measured = Measured {
+        context: &context,
+        time_line: &time_line,
+        records,
+        scene,
+        method: serde_json::json!({"transfers": 7}),
+    };
     write_measurements(&request, measured, &mut table).unwrap();
 
     let profile = Profile::read(&folder.path().join("p.json")).unwrap();

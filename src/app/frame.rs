@@ -272,7 +272,6 @@ impl Method {
                     }
                 };
                 tracing::info!("{}", method.report());
-                method.report().iterations.iter().for_each(|iteration| tracing::debug!("{iteration}"));
                 let colors = method.colors(context).map_err(AppError::failed)?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {

@@ -285,7 +285,8 @@ pub fn run(
     let records = context.take_records();
     let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;
     time_line.span("write picture", || output::write_picture(request, picture, context.info()))?;
-    let measured = Measured { context: &context, time_line: &time_line, records, scene: stage.facts(), method: method.report()? };
+    let measured =
+        Measured { context: &context, time_line: &time_line, records, scene: stage.facts(), method: method.report()? };
     if global.verbosity() >= Verbosity::Detailed {
         output::write_measurements(request, measured, out)?;
     } else {

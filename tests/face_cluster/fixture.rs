@@ -86,6 +86,7 @@ impl Fixture {
 
 /// A leaf element with the irradiance of its mean normal, W/m2.
 pub struct Leaf {
+    pub index: u32,
     pub element: FaceElement,
     pub direct: Vec3,
     pub indirect: Vec3,
@@ -104,7 +105,7 @@ pub fn leaves(context: &TestContext, method: &FaceClusters) -> Vec<Leaf> {
         if element.children == u32::MAX {
             let normal = element.axis_z * ((element.facing[4] - element.facing[5]) / element.area);
             let along = |of: &[[[f32; 3]; 3]]| Mat3::from_cols_array_2d(&of[i * functions]).transpose() * normal;
-            leaves.push(Leaf { direct: along(&direct), indirect: along(&indirect), element });
+            leaves.push(Leaf { index: i as u32, direct: along(&direct), indirect: along(&indirect), element });
         }
     }
     leaves

@@ -105,34 +105,30 @@ void main()
 
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
     uint turn = a.cluster * 7u + b.cluster * 13u;
-    float free[RECEIVER_NODES], cast_rays[RECEIVER_NODES];
+    float free[RECEIVER_NODES];
     bool any_free = false;
     uint ray_count = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
-    // After n blocked rays a share of 1 / (n + 2) is still to be expected free: where that is too much to lose, more
-    // rays are cast, and at last the pair is split.                                            [Laplace1774]
-    float stake = a.most_albedo * greatest_of_all / params.threshold;
-    uint most_rays = max(ray_count, uint(clamp(stake - 2.0, 0.0, float(RECEIVER_NODES * SHOOTER_NODES))));
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = cast_rays[r] = 0.0;
-    uint k = 0;
-    [[dont_unroll]] for (; k < ray_count || (k < most_rays && !any_free); ++k) {
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
+    [[dont_unroll]] for (uint k = 0; k < ray_count; ++k) {
         uint r = is_small ? turn % RECEIVER_NODES : k % RECEIVER_NODES;
         vec3 x = receiver_node(receiver, r), y = shooter_node(shooter, (turn + k) % SHOOTER_NODES);
         Ray ray = Ray(x, 1e-4, y - x, 1.0 - 1e-4);
         float share = visibility(a, ray);
         any_free = any_free || share > 0.0;
-        free[r] += share;
-        cast_rays[r] += 1.0;
+        free[r] += share / float(params.rays_per_node);
     }
-    atomicAdd(pool[0].rays, k);
+    atomicAdd(pool[0].rays, ray_count);
     uint split = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
     bool may_split = can_split(a) || can_split(b);
     if (!any_free) {
-        if (may_split && stake > float(k) + 2.0) decisions[i] = split;
+        // After n blocked rays a share of 1 / (n + 2) is still to be expected free, if all shares are alike: where
+        // that is too much to lose, it is looked for in the halves.
+        if (may_split && a.most_albedo * greatest_of_all > params.threshold * float(ray_count + 2)) decisions[i] = split;
         return;
     }
-    float only = free[turn % RECEIVER_NODES];
+    float only = free[turn % RECEIVER_NODES] * float(params.rays_per_node);
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        free[r] = is_small ? only : free[r] / max(cast_rays[r], 1.0);
+        if (is_small) free[r] = only;
         at_nodes[r] *= free[r];
         if (free[r] < 0.999) least[r] = 0.0;
         if (free[r] == 0.0) greatest[r] = 0.0;

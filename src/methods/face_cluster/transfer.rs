@@ -45,7 +45,7 @@ impl FaceClusters {
 
         let counters = context.download(&self.state.pool)?[0];
         let received = self.received(context, counters.element_count as usize)?;
-        self.report.iterations.push(Iteration {
+        let iteration = Iteration {
             name: pass.name.clone(),
             pairs,
             transfers: counters.transfers,
@@ -55,7 +55,9 @@ impl FaceClusters {
             received,
             largest_unshot: f32::from_bits(counters.largest_unshot),
             seconds: clock.elapsed().as_secs_f64(),
-        });
+        };
+        tracing::debug!("{iteration}");
+        self.report.iterations.push(iteration);
         Ok(())
     }
 
