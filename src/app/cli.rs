@@ -65,6 +65,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Measure how long frames and passes take: methods, settings and devices in turns, with confidence
     Bench(BenchArgs),
+    /// Hold every table and figure of the methods' papers to what is measured here: a page
+    Papers(PapersArgs),
     /// Write a method's solution into the scene: vertex colours, a lightmap, or light by direction
     Bake(BakeArgs),
     /// Print how far picture A is from reference B
@@ -276,6 +278,34 @@ pub struct BenchArgs {
     /// Options of `linklight render` for all subjects, such as -- --size 480x270 --bounces 2
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     pub options: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct PapersArgs {
+    /// Folder of the page and the data; made when missing
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Rows of this method's paper, see `linklight methods`; may be repeated [default: all]
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub method: Vec<&'static Method>,
+    /// Only rows whose place ("Table 1"), words or scene contain this text
+    #[arg(long, value_name = "TEXT")]
+    pub only: Option<String>,
+    /// Leave out what takes minutes on a software driver
+    #[arg(long)]
+    pub quick: bool,
+    /// Frames that are timed
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub frames: u32,
+    /// Trace references until the standard error of a pixel is this fraction of the picture's mean
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.03, value_parser = parse_fraction)]
+    pub noise: f64,
+    /// Paths per pixel at which references end all the same
+    #[arg(long, value_name = "N", default_value_t = 2048, value_parser = clap::value_parser!(u32).range(2..=1_048_576))]
+    pub reference_spp: u32,
+    /// Print the data of the page (DIR/papers.json) as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 #[derive(Debug, Args)]

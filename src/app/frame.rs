@@ -185,12 +185,14 @@ impl Method {
         }
     }
 
-    /// What the method counted, by its own names.
+    /// What the method made and counted, by its own names.
     pub fn report(&self) -> Result<Value, AppError> {
-        match self {
-            Self::FaceClusters(shown) => Ok(serde_json::to_value(shown.method.report())?),
-            _ => Ok(Value::Null),
-        }
+        Ok(match self {
+            Self::PathTracing(_) => Value::Null,
+            Self::OnElements(shown) => shown.method.facts()?,
+            Self::OnTexels(shown) => serde_json::to_value(shown.report())?,
+            Self::FaceClusters(shown) => serde_json::to_value(shown.method.report())?,
+        })
     }
 
     /// One frame into `film`. Where the user ends it early, [`AppError::Partial`] says that the film holds a part.

@@ -6,6 +6,7 @@
 //! | [`bake`] | `linklight bake`: a solution into the scene |
 //! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
+//! | [`papers`] | `linklight papers`: the papers' tables and figures, measured here |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
 //! | [`devices`] | `linklight devices`: GPUs, usable or not |
 //! | [`methods`] | `linklight methods`: methods and their settings |
@@ -27,6 +28,7 @@ pub mod methods;
 mod on_elements;
 mod on_texels;
 pub mod output;
+pub mod papers;
 pub mod render;
 mod stage;
 pub mod values;
@@ -55,6 +57,10 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
         cli::Command::Bake(args) => {
             let interrupt = interrupt::Interrupt::install();
             bake::run(&args, &cli.global, &console, &interrupt, out)
+        }
+        cli::Command::Papers(args) => {
+            let interrupt = interrupt::Interrupt::install();
+            papers::run(&args, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
         cli::Command::Devices(args) => devices::run(&args, &cli.global, out),

@@ -10,12 +10,15 @@ use crate::scene::camera::View;
 use crate::stages::elements::Elements;
 use crate::stages::world::World;
 use glam::{UVec2, Vec3};
+use serde_json::Value;
 
 /// A method whose solution is irradiance per element.
 pub trait OnElements {
     /// The light of direct illumination and `bounces` more, with all that has to be made anew for a frame.
     fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError>;
     fn elements(&self) -> &Elements;
+    /// What was made for it, in numbers: the method's report.
+    fn facts(&self) -> serde_json::Result<Value>;
     /// From punctual lights, W/m2 per element.
     fn punctual_irradiance(&self) -> &Buffer<Vec3>;
     /// From emitters and the environment.
@@ -45,6 +48,10 @@ impl OnElements for ExplicitVisibility {
         Self::elements(self)
     }
 
+    fn facts(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(self.report())
+    }
+
     fn punctual_irradiance(&self) -> &Buffer<Vec3> {
         Self::punctual_irradiance(self)
     }
@@ -69,6 +76,10 @@ impl OnElements for ImplicitVisibility {
 
     fn elements(&self) -> &Elements {
         Self::elements(self)
+    }
+
+    fn facts(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(self.report())
     }
 
     fn punctual_irradiance(&self) -> &Buffer<Vec3> {
@@ -113,6 +124,10 @@ impl OnElements for Antiradiance {
 
     fn elements(&self) -> &Elements {
         Self::elements(self)
+    }
+
+    fn facts(&self) -> serde_json::Result<Value> {
+        serde_json::to_value(self.report())
     }
 
     fn punctual_irradiance(&self) -> &Buffer<Vec3> {

@@ -10,7 +10,7 @@ use crate::display::g_buffer::GBuffer;
 use crate::display::lightmap::{self, Lightmap, TexelLight};
 use crate::display::shadow_maps::ShadowMaps;
 use crate::gpu::Context;
-use crate::methods::surface_shadow_maps::{self, SurfaceShadowMaps};
+use crate::methods::surface_shadow_maps::{self, Report, SurfaceShadowMaps};
 use crate::report::image::write_exr;
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
@@ -63,6 +63,10 @@ impl TexelsShown {
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         Ok(Self { method, shadow_maps, g_buffer, shown })
+    }
+
+    pub fn report(&self) -> Report {
+        self.method.report()
     }
 
     /// The solution of `bounces` bounces alone.

@@ -7,6 +7,7 @@
 //! | [`errors`] | how far a picture is from a reference: RMSE, relative MSE, energy, SSIM, FLIP |
 //! | [`bench_file`] | the file of `linklight bench` |
 //! | [`compare_page`] | the page of `linklight compare` and its data |
+//! | [`papers_page`] | the page of `linklight papers` and its data |
 //! | [`plot`] | log-log plots as SVG |
 //! | [`profile`] | the `--profile` JSON file |
 //! | [`trace`] | the `--trace` file for Perfetto and `chrome://tracing` |
@@ -22,6 +23,7 @@ pub mod errors;
 mod exr_file;
 pub mod heat_map;
 pub mod image;
+pub mod papers_page;
 pub mod plot;
 mod png_file;
 pub mod profile;

@@ -26,14 +26,20 @@ pub struct Measured {
 
 /// Runs on a device of its own, so that memory is this run's alone. Preparation is timed the second time, when the
 /// driver has compiled everything; frames after a first one.
-pub fn measure(run: &Run, frames: u32, watch: &dyn Watch) -> Result<Measured, AppError> {
+///
+/// `each_bounce` asks for the means with fewer bounces, which costs a frame each.
+pub fn measure(run: &Run, frames: u32, each_bounce: bool, watch: &dyn Watch) -> Result<Measured, AppError> {
     let context = render::open_device(&run.global, true)?;
     let stage = Stage::new(&context, &run.request, &TimeLine::default())?;
     let film = Film::new(&context, run.request.width, run.request.height)?;
+    let mut prepared = context.take_records();
     drop(frame::Method::prepare(&context, &run.request, &stage, watch)?);
+    context.take_records();
     let start = Instant::now();
     let mut method = frame::Method::prepare(&context, &run.request, &stage, watch)?;
     let prepare_ms = milliseconds(start);
+    prepared.extend(context.take_records());
+    let prepare_passes = summarise(&measure::pass_records(prepared));
 
     method.frame(&context, &run.request, &stage, &film, watch)?;
     context.take_records();
@@ -46,8 +52,9 @@ pub fn measure(run: &Run, frames: u32, watch: &dyn Watch) -> Result<Measured, Ap
     let passes = summarise(&measure::pass_records(context.take_records()));
     let picture = frame::picture(&context, &run.request, &film)?;
 
+    let facts = method.report()?;
     let mut bounce_means = Vec::new();
-    for bounces in 0..run.request.bounces {
+    for bounces in 0..if each_bounce { run.request.bounces } else { 0 } {
         let mut request = run.request.clone();
         request.bounces = bounces;
         method.frame(&context, &request, &stage, &film, watch)?;
@@ -57,14 +64,17 @@ pub fn measure(run: &Run, frames: u32, watch: &dyn Watch) -> Result<Measured, Ap
     render::check_validation(&context)?;
 
     let memory = measure::memory(&context.memory_by_owner());
-    let facts = stage.facts();
+    let scene = stage.facts();
     let cost = Cost {
         prepare_ms,
         frame_ms: Milliseconds::of(frame_ns),
         peak_bytes: memory.peak_bytes,
-        triangles: facts.triangles,
-        elements: facts.elements,
+        triangles: scene.triangles,
+        elements: scene.elements,
         passes,
+        prepare_passes,
+        memory: memory.owners,
+        facts,
     };
     Ok(Measured { picture, cost, bounce_means })
 }

@@ -1,8 +1,8 @@
 //! `linklight compare SCENE... -o DIR`: methods and settings beside the reference, as a page, as data, and as a test.
 
-mod measured;
+pub(super) mod measured;
 pub(super) mod plan;
-mod reference;
+pub(super) mod reference;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -226,7 +226,7 @@ impl Session<'_> {
     }
 
     fn run(&self, run: &Run, reference: &Reference, reference_means: &[f64]) -> Result<Done, AppError> {
-        let measured = measured::measure(run, self.args.frames, &self.watch)?;
+        let measured = measured::measure(run, self.args.frames, true, &self.watch)?;
         let comparison = compare(&measured.picture, &reference.picture, None, &self.tone)?;
         let exr = &run.request.output.path;
         image::write_exr(exr, &measured.picture)?;

@@ -38,6 +38,7 @@ use crate::stages::trace::Tracer;
 use crate::stages::work::Watch;
 use crate::stages::world::World;
 use glam::Vec3;
+use serde::Serialize;
 use std::path::Path;
 
 crate::choice! {
@@ -143,7 +144,7 @@ struct State {
 }
 
 /// What was made, in numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Report {
     pub texels: u32,
     pub charts: u32,

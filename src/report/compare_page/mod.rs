@@ -9,9 +9,10 @@
 mod html;
 
 use serde::Serialize;
+use serde_json::Value;
 
 use super::errors::ErrorFigures;
-use super::profile::{Device, Milliseconds, Pass};
+use super::profile::{Device, MemoryOwner, Milliseconds, Pass};
 
 pub use html::to_html;
 
@@ -106,7 +107,14 @@ pub struct Cost {
     pub peak_bytes: u64,
     pub triangles: u64,
     pub elements: u64,
+    /// Of the timed frames.
     pub passes: Vec<Pass>,
+    /// Of placing the scene and of the timed preparation.
+    pub prepare_passes: Vec<Pass>,
+    /// Device memory by owner.
+    pub memory: Vec<MemoryOwner>,
+    /// The method's own report.
+    pub facts: Value,
 }
 
 /// The path tracer after so many samples.
