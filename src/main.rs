@@ -7,7 +7,11 @@ use clap::Parser as _;
 use linklight::app;
 
 fn main() -> ExitCode {
-    let cli = match app::cli::Cli::try_parse() {
+    let words = match app::state::expand(std::env::args_os()) {
+        Ok(words) => words,
+        Err(error) => return failed(&error),
+    };
+    let cli = match app::cli::Cli::try_parse_from(words) {
         Ok(cli) => cli,
         Err(error) => {
             // `--help` and `--version` come here too, with exit code 0. A closed pipe is no reason to fail.
@@ -20,9 +24,11 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is_closed_pipe() => ExitCode::SUCCESS,
-        Err(error) => {
-            let _ = writeln!(std::io::stderr(), "error: {error}");
-            ExitCode::from(error.exit_code())
-        }
+        Err(error) => failed(&error),
     }
+}
+
+fn failed(error: &app::AppError) -> ExitCode {
+    let _ = writeln!(std::io::stderr(), "error: {error}");
+    ExitCode::from(error.exit_code())
 }

@@ -4,13 +4,14 @@
 use std::path::PathBuf;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use glam::Vec3;
 
 use super::compare::Variation;
 use super::console::Verbosity;
 use super::diff::Limit;
 use super::values::{
-    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_fraction, parse_glb,
-    parse_measuring_seconds, parse_method, parse_scale, parse_size,
+    CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
+    parse_glb, parse_measuring_seconds, parse_method, parse_place, parse_scale, parse_size, parse_turn,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -61,6 +62,8 @@ impl Global {
 pub enum Command {
     /// Render a scene into a picture
     Render(Box<RenderArgs>),
+    /// Look at a scene in a window: cameras, methods, all settings, times of all passes
+    View(Box<ViewArgs>),
     /// Hold methods and settings to the reference: error, energy, time and memory as a page that opens from disk
     Compare(CompareArgs),
     /// Measure how long frames and passes take: methods, settings and devices in turns, with confidence
@@ -77,14 +80,15 @@ pub enum Command {
     Methods(MethodsArgs),
 }
 
-#[derive(Debug, Args)]
-pub struct RenderArgs {
+/// What decides a picture, of `render` and of `view` alike.
+#[derive(Debug, Clone, Args)]
+pub struct PictureArgs {
     /// A .gltf or .glb file, or builtin:NAME
     #[arg(value_name = "SCENE")]
     pub scene: SceneSource,
-    /// Picture to write: .exr holds linear radiance, .png what a display shows
-    #[arg(short, long, value_name = "FILE.exr|FILE.png")]
-    pub output: Output,
+    /// Take SCENE and options from a state file, which `linklight view` writes; further options override it
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
     /// Method, see `linklight methods`
     #[arg(long, value_name = "KEY", value_parser = parse_method, default_value = "explicit-visibility")]
     pub method: &'static Method,
@@ -103,15 +107,24 @@ pub struct RenderArgs {
     /// Animation time in seconds
     #[arg(long, value_name = "T", default_value_t = 0.0, value_parser = parse_animation_seconds, allow_negative_numbers = true)]
     pub seconds: f32,
-    /// Frames to compute; the last one is written
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    pub frames: u32,
     /// Camera of the scene, by name or index [default: the first, else one framed on the bounds]
     #[arg(long, value_name = "NAME|INDEX")]
     pub camera: Option<CameraChoice>,
+    /// Look from here, metres, in place of a camera of the scene
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "look_at")]
+    pub eye: Option<Vec3>,
+    /// ... towards here
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_place, allow_hyphen_values = true, requires = "eye")]
+    pub look_at: Option<Vec3>,
+    /// ... with this vertical field of view, degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 40.0, value_parser = parse_field_of_view)]
+    pub fov: f32,
     /// Environment: an equirectangular .hdr/.exr picture, or one radiance for all directions [default: none]
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true)]
     pub env: Option<EnvironmentSource>,
+    /// Turn the environment about the vertical, degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = parse_turn, allow_negative_numbers = true)]
+    pub env_turn: f32,
     /// Leave out specular reflection: every surface is Lambertian with its base colour
     #[arg(long)]
     pub diffuse: bool,
@@ -140,6 +153,19 @@ pub struct RenderArgs {
     /// A setting of the method or of the display, see `linklight methods`; may be repeated
     #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
     pub set: Vec<Assignment>,
+}
+
+#[derive(Debug, Args)]
+#[command(args_override_self = true)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Picture to write: .exr holds linear radiance, .png what a display shows
+    #[arg(short, long, value_name = "FILE.exr|FILE.png")]
+    pub output: Output,
+    /// Frames to compute; the last one is written
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
     /// Extra channels of an .exr, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', value_name = "NAME,...")]
     pub channels: Vec<Channel>,
@@ -155,6 +181,19 @@ pub struct RenderArgs {
     /// Write a RenderDoc capture of the last frame
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(args_override_self = true)]
+pub struct ViewArgs {
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Folder of screenshots and states
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    pub shots: PathBuf,
+    /// Start with the panels hidden: the picture fills the window
+    #[arg(long)]
+    pub bare: bool,
 }
 
 /// Display stages.

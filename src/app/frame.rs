@@ -4,13 +4,14 @@ use super::AppError;
 use super::cli::{Channel, Display};
 use super::on_elements::OnElements;
 use super::on_texels::TexelsShown;
-use super::render::{LightParts, RenderRequest, cache_folder};
+use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::direct::Sample;
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::irradiance_vector;
 use crate::display::shadow_maps::ShadowMaps;
+use crate::display::tone_map::LightParts;
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
@@ -26,6 +27,10 @@ use crate::stages::work::Watch;
 use glam::UVec2;
 use serde_json::Value;
 use std::path::Path;
+
+/// Tasks that sample a picture again and again, and may be left at any sample for a newer one.
+pub const SAMPLING_TASKS: [&str; 2] = ["path-tracing", GATHER_TASK];
+const GATHER_TASK: &str = "final gather";
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {
@@ -97,6 +102,18 @@ fn cluster_stage<'a>(
     }
 }
 
+fn path_tracing(context: &Context, request: &RenderRequest, stage: &Stage) -> Result<PathTracing, AppError> {
+    let options = Options {
+        width: request.width,
+        height: request.height,
+        bounces: request.bounces,
+        seed: request.seed,
+        settings: request.settings()?,
+    };
+    let Stage { scene, geometry, world, .. } = stage;
+    PathTracing::new(context, scene, geometry, world, options).map_err(AppError::failed)
+}
+
 impl Method {
     /// Everything a method does once per scene and pose.
     pub fn prepare(
@@ -106,18 +123,7 @@ impl Method {
         watch: &dyn Watch,
     ) -> Result<Self, AppError> {
         match request.method.key {
-            "path-tracing" => {
-                let options = Options {
-                    width: request.width,
-                    height: request.height,
-                    bounces: request.bounces,
-                    seed: request.seed,
-                    settings: request.settings()?,
-                };
-                let Stage { scene, geometry, world, .. } = stage;
-                let method = PathTracing::new(context, scene, geometry, world, options).map_err(AppError::failed)?;
-                Ok(Self::PathTracing(Box::new(method)))
-            }
+            "path-tracing" => Ok(Self::PathTracing(Box::new(path_tracing(context, request, stage)?))),
             "explicit-visibility" => {
                 let settings = request.settings()?;
                 let method = ExplicitVisibility::prepare(context, &explicit_stage(stage, watch), settings);
@@ -160,10 +166,7 @@ impl Method {
     ) -> Result<Self, AppError> {
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
-        let gather = match request.display {
-            Some(Display::FinalGather) => Some(Gather::new(context, request, stage, &*method)?),
-            _ => None,
-        };
+        let gather = Gather::of_display(context, request, stage, &*method)?;
         Ok(Self::OnElements(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
     }
 
@@ -193,6 +196,22 @@ impl Method {
             Self::OnTexels(shown) => serde_json::to_value(shown.report())?,
             Self::FaceClusters(shown) => serde_json::to_value(shown.method.report())?,
         })
+    }
+
+    /// Takes over what `request` changed of the picture alone: its size, its display and what that was told. The
+    /// solution stays.
+    pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {
+        let g_buffer = || GBuffer::new(context, request.width, request.height);
+        match self {
+            Self::PathTracing(method) => **method = path_tracing(context, request, stage)?,
+            Self::OnElements(shown) => {
+                shown.g_buffer = g_buffer()?;
+                shown.gather = Gather::of_display(context, request, stage, &*shown.method)?;
+            }
+            Self::OnTexels(shown) => shown.show(context, request)?,
+            Self::FaceClusters(shown) => shown.g_buffer = g_buffer()?,
+        }
+        Ok(())
     }
 
     /// One frame into `film`. Where the user ends it early, [`AppError::Partial`] says that the film holds a part.
@@ -289,6 +308,17 @@ impl Method {
 }
 
 impl Gather {
+    /// Where the request shows by a final gather.
+    fn of_display(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        method: &dyn OnElements,
+    ) -> Result<Option<Self>, AppError> {
+        let is_asked = request.display == Some(Display::FinalGather);
+        is_asked.then(|| Self::new(context, request, stage, method)).transpose()
+    }
+
     fn new(
         context: &Context,
         request: &RenderRequest,
@@ -364,14 +394,14 @@ pub(super) fn gather_samples(
     watch: &dyn Watch,
 ) -> Result<(), AppError> {
     for index in 0..request.spp {
-        watch.step("final gather", index.into(), request.spp.into())?;
+        watch.step(GATHER_TASK, index.into(), request.spp.into())?;
         let mut recorder = context.recorder("frame")?;
         recorder.scope("display", |recorder| {
             display.draw(recorder, gathered, Sample { index, samples: request.spp, is_unlit: false }, film);
         });
         recorder.submit()?;
     }
-    watch.step("final gather", request.spp.into(), request.spp.into())?;
+    watch.step(GATHER_TASK, request.spp.into(), request.spp.into())?;
     display.show_cut_sizes(context, film)?;
     let report = display.report(context)?;
     tracing::info!("{report}");

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
 //! | [`bake`] | `linklight bake`: a solution into the scene |
+//! | [`mod@view`] | `linklight view`: a scene in a window |
 //! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
 //! | [`papers`] | `linklight papers`: the papers' tables and figures, measured here |
@@ -31,7 +32,9 @@ pub mod output;
 pub mod papers;
 pub mod render;
 mod stage;
+pub mod state;
 pub mod values;
+mod view;
 
 use std::io::Write;
 
@@ -46,6 +49,7 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
             let interrupt = interrupt::Interrupt::install();
             render::run(&request, &cli.global, &console, &interrupt, out)
         }
+        cli::Command::View(args) => view::run(&args, &cli.global),
         cli::Command::Bench(args) => {
             let interrupt = interrupt::Interrupt::install();
             bench::run(&args, &cli.global, &console, &interrupt, out)

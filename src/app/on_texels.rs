@@ -28,6 +28,18 @@ enum Shown {
     Lightmap(Box<Lightmap>),
 }
 
+impl Shown {
+    fn new(context: &Context, request: &RenderRequest, method: &SurfaceShadowMaps) -> Result<Self, AppError> {
+        if request.display == Some(Display::Lightmap) {
+            return Ok(Self::Lightmap(Box::new(Lightmap::new(context, &method.atlas)?)));
+        }
+        let size = [request.width, request.height];
+        let settings = request.final_gather_settings()?;
+        check_visibility(request, settings.gather_visibility, method.maps.is_some())?;
+        Ok(Self::FinalGather(FinalGather::new(context, size, settings, request.tone, request.seed)?))
+    }
+}
+
 impl TexelsShown {
     pub fn prepare(
         context: &Context,
@@ -51,15 +63,7 @@ impl TexelsShown {
         };
         let method = SurfaceShadowMaps::prepare(context, &of_scene, request.settings()?).map_err(AppError::failed)?;
         tracing::info!("{}", method.report());
-        let shown = match request.display {
-            Some(Display::Lightmap) => Shown::Lightmap(Box::new(Lightmap::new(context, &method.atlas)?)),
-            _ => {
-                let size = [request.width, request.height];
-                let settings = request.final_gather_settings()?;
-                check_visibility(request, settings.gather_visibility, method.maps.is_some())?;
-                Shown::FinalGather(FinalGather::new(context, size, settings, request.tone, request.seed)?)
-            }
-        };
+        let shown = Shown::new(context, request, &method)?;
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         Ok(Self { method, shadow_maps, g_buffer, shown })
@@ -77,6 +81,13 @@ impl TexelsShown {
         });
         recorder.submit()?;
         Ok(&self.method)
+    }
+
+    /// As [`super::frame::Method::show`].
+    pub fn show(&mut self, context: &Context, request: &RenderRequest) -> Result<(), AppError> {
+        self.shown = Shown::new(context, request, &self.method)?;
+        self.g_buffer = GBuffer::new(context, request.width, request.height)?;
+        Ok(())
     }
 
     pub fn frame(

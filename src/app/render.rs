@@ -3,9 +3,10 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
+use glam::Vec3;
 use serde_json::{Map, Value, json};
 
-use super::cli::{Channel, Display, Global, Rays, RenderArgs};
+use super::cli::{Channel, Display, Global, PictureArgs, Rays, RenderArgs};
 use super::console::{Console, Verbosity, Watcher};
 use super::interrupt::Interrupt;
 use super::output::Measured;
@@ -13,6 +14,7 @@ use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
 use super::{AppError, frame, output};
 use crate::display::final_gather;
+pub use crate::display::tone_map::LightParts;
 use crate::gpu::{Capture, Context, Options, prepare_capture};
 use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
@@ -48,7 +50,11 @@ pub struct RenderRequest {
     pub frames: u32,
     /// `None` takes the first of the scene, else one framed on its bounds.
     pub camera: Option<CameraChoice>,
+    /// In place of a camera.
+    pub free_camera: Option<FreeCamera>,
     pub environment: Option<EnvironmentSource>,
+    /// Degrees about the vertical.
+    pub environment_turn: f32,
     /// Specular reflection is left out.
     pub diffuse: bool,
     pub light: LightParts,
@@ -70,6 +76,16 @@ pub struct RenderRequest {
     pub capture: Option<PathBuf>,
 }
 
+/// The display stages that can show a method's solution, the default first; none for one with pixels of its own.
+pub fn displays(method: &Method) -> &'static [Display] {
+    match method.key {
+        "path-tracing" => &[],
+        "surface-shadow-maps" => &[Display::FinalGather, Display::Lightmap],
+        "face-cluster" => &[Display::IrradianceVector],
+        _ => &[Display::Vertex, Display::FinalGather],
+    }
+}
+
 /// Those that the display stage declares, and the others, which the method must know.
 fn split_assignments(display: Option<Display>, all: Vec<Assignment>) -> (Vec<Assignment>, Vec<Assignment>) {
     let specs = match display {
@@ -79,12 +95,14 @@ fn split_assignments(display: Option<Display>, all: Vec<Assignment>) -> (Vec<Ass
     all.into_iter().partition(|assignment| specs.iter().any(|spec| spec.name == assignment.key))
 }
 
-/// Which light is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LightParts {
-    All,
-    DirectOnly,
-    IndirectOnly,
+/// A camera that is none of the scene's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeCamera {
+    /// Metres.
+    pub eye: Vec3,
+    pub look_at: Vec3,
+    /// Vertical field of view, degrees.
+    pub fov: f32,
 }
 
 impl TryFrom<RenderArgs> for RenderRequest {
@@ -92,50 +110,17 @@ impl TryFrom<RenderArgs> for RenderRequest {
 
     fn try_from(args: RenderArgs) -> Result<Self, AppError> {
         let usage = |message: String| Err(AppError::Usage(message));
-        let path_traced = args.method.key == "path-tracing";
-        if path_traced && args.display.is_some() {
-            return usage(
-                "--display applies to methods that solve on elements; path-tracing has pixels of its own".into(),
-            );
-        }
         if args.output.format == Format::Png && !args.channels.is_empty() {
             let output = args.output.path.display();
             return usage(format!("--channels needs an .exr; {output} is a .png and has no room for them"));
         }
-        if args.indirect_only && args.bounces == 0 {
-            return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
+        let key = args.picture.method.key;
+        if args.lightmap.is_some() && key != "surface-shadow-maps" {
+            return usage(format!("--lightmap needs --method surface-shadow-maps; {key} has no atlas"));
         }
-        let on_texels = args.method.key == "surface-shadow-maps";
-        let on_clusters = args.method.key == "face-cluster";
-        let default = match args.method.key {
-            "surface-shadow-maps" => Display::FinalGather,
-            "face-cluster" => Display::IrradianceVector,
-            _ => Display::Vertex,
-        };
-        let display = (!path_traced).then(|| args.display.unwrap_or(default));
-        if let Some(shown) = display
-            && ((on_texels && shown == Display::Vertex)
-                || (!on_texels && shown == Display::Lightmap)
-                || on_clusters != (shown == Display::IrradianceVector))
-        {
-            let key = args.method.key;
-            let (what, others) = if on_texels {
-                ("texels, not vertices", "final-gather or lightmap")
-            } else if on_clusters {
-                ("clusters of faces, not vertices", "irradiance-vector")
-            } else {
-                ("vertices, not an atlas", "vertex or final-gather")
-            };
-            return usage(format!("{key} solves on {what}; show it by --display {others}"));
-        }
-        if args.lightmap.is_some() && !on_texels {
-            return usage(format!("--lightmap needs --method surface-shadow-maps; {} has no atlas", args.method.key));
-        }
-        let (of_display, of_method) = split_assignments(display, args.set);
-        args.method.record(&of_method)?;
-        final_gather::Settings::from_assignments(&of_display)?;
+        let mut request = Self::of_picture(&args.picture, args.output)?;
 
-        let mut written = vec![&args.output.path];
+        let mut written = vec![&request.output.path];
         written.extend([&args.lightmap, &args.profile, &args.trace, &args.capture].into_iter().flatten());
         for (index, path) in written.iter().enumerate() {
             if written[..index].contains(path) {
@@ -143,17 +128,61 @@ impl TryFrom<RenderArgs> for RenderRequest {
             }
             check_writable(path)?;
         }
-
-        let mut channels: Vec<Channel> = Vec::new();
         for channel in args.channels {
-            if !channels.contains(&channel) {
-                channels.push(channel);
+            if !request.channels.contains(&channel) {
+                request.channels.push(channel);
             }
         }
-        channels.sort_by_key(|channel| *channel as u32);
+        request.channels.sort_by_key(|channel| *channel as u32);
+        request.frames = args.frames;
+        request.lightmap = args.lightmap;
+        request.profile = args.profile;
+        request.trace = args.trace;
+        request.capture = args.capture;
+        Ok(request)
+    }
+}
+
+impl RenderRequest {
+    /// One frame of the picture that `args` decide, for `output`, and nothing written beside it.
+    pub fn of_picture(args: &PictureArgs, output: Output) -> Result<Self, AppError> {
+        let usage = |message: String| Err(AppError::Usage(message));
+        let path_traced = args.method.key == "path-tracing";
+        if path_traced && args.display.is_some() {
+            return usage(
+                "--display applies to methods that solve on elements; path-tracing has pixels of its own".into(),
+            );
+        }
+        if args.indirect_only && args.bounces == 0 {
+            return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
+        }
+        let displays = displays(args.method);
+        let display = displays.first().map(|&default| args.display.unwrap_or(default));
+        if display.is_some_and(|shown| !displays.contains(&shown)) {
+            let key = args.method.key;
+            let (what, others) = if displays.contains(&Display::Lightmap) {
+                ("texels, not vertices", "final-gather or lightmap")
+            } else if displays.contains(&Display::IrradianceVector) {
+                ("clusters of faces, not vertices", "irradiance-vector")
+            } else {
+                ("vertices, not an atlas", "vertex or final-gather")
+            };
+            return usage(format!("{key} solves on {what}; show it by --display {others}"));
+        }
+        let (of_display, of_method) = split_assignments(display, args.set.clone());
+        args.method.record(&of_method)?;
+        final_gather::Settings::from_assignments(&of_display)?;
+
+        let free_camera = match (args.eye, args.look_at) {
+            (Some(eye), Some(look_at)) if eye.distance(look_at) > 0.0 => {
+                Some(FreeCamera { eye, look_at, fov: args.fov })
+            }
+            (Some(eye), Some(_)) => return usage(format!("--eye and --look-at are both {eye}; move one of them")),
+            _ => None,
+        };
         Ok(Self {
-            scene: args.scene,
-            output: args.output,
+            scene: args.scene.clone(),
+            output,
             method: args.method,
             display,
             bounces: args.bounces,
@@ -161,9 +190,11 @@ impl TryFrom<RenderArgs> for RenderRequest {
             height: args.size.1,
             spp: args.spp.unwrap_or(if path_traced { DEFAULT_SPP } else { DEFAULT_DISPLAY_SPP }),
             seconds: args.seconds,
-            frames: args.frames,
-            camera: args.camera,
-            environment: args.env,
+            frames: 1,
+            camera: args.camera.clone(),
+            free_camera,
+            environment: args.env.clone(),
+            environment_turn: args.env_turn,
             diffuse: args.diffuse,
             light: match (args.direct_only, args.indirect_only) {
                 (true, _) => LightParts::DirectOnly,
@@ -176,16 +207,14 @@ impl TryFrom<RenderArgs> for RenderRequest {
             seed: args.seed,
             assignments: of_method,
             display_assignments: of_display,
-            channels,
-            lightmap: args.lightmap,
-            profile: args.profile,
-            trace: args.trace,
-            capture: args.capture,
+            channels: Vec::new(),
+            lightmap: None,
+            profile: None,
+            trace: None,
+            capture: None,
         })
     }
-}
 
-impl RenderRequest {
     /// The method's settings, typed; `S` must be the `Settings` of [`Self::method`].
     pub fn settings<S: SettingGroup>(&self) -> Result<S, AppError> {
         Ok(S::from_assignments(&self.assignments)?)
@@ -212,6 +241,15 @@ impl RenderRequest {
         insert("frames", self.frames.into());
         insert("camera", json!(camera));
         insert("environment", json!(environment));
+        if let Some(FreeCamera { eye, look_at, fov }) = self.free_camera {
+            let place = |place: Vec3| json!(place.to_array().map(|value| value.to_json()));
+            insert("eye", place(eye));
+            insert("look_at", place(look_at));
+            insert("fov", fov.to_json());
+        }
+        if self.environment_turn != 0.0 {
+            insert("environment_turn", self.environment_turn.to_json());
+        }
         insert("diffuse", self.diffuse.into());
         insert("light", self.light.name().into());
         insert("elements", json!(self.elements));
@@ -230,16 +268,6 @@ impl RenderRequest {
         }
         insert("settings", self.method.record(&self.assignments)?.into());
         Ok(record)
-    }
-}
-
-impl LightParts {
-    fn name(self) -> &'static str {
-        match self {
-            Self::All => "all",
-            Self::DirectOnly => "direct",
-            Self::IndirectOnly => "indirect",
-        }
     }
 }
 
@@ -320,7 +348,7 @@ pub fn check_validation(context: &Context) -> Result<(), AppError> {
 }
 
 /// Where the driver's compiled pipelines are kept between runs.
-fn pipeline_cache() -> Option<PathBuf> {
+pub(super) fn pipeline_cache() -> Option<PathBuf> {
     Some(cache_folder()?.join("pipelines.bin"))
 }
 

@@ -4,7 +4,7 @@ use glam::{UVec2, Vec3};
 
 use super::AppError;
 use super::cli::Rays;
-use super::render::RenderRequest;
+use super::render::{FreeCamera, RenderRequest};
 use super::values::SceneSource;
 use crate::gpu::{AccelerationStructure, Context};
 use crate::report::profile::SceneFacts;
@@ -48,10 +48,23 @@ impl Stage {
     /// Loads and places what `request` asks for. What was skipped or repaired on the way is logged.
     pub fn new(context: &Context, request: &RenderRequest, time_line: &TimeLine) -> Result<Self, AppError> {
         let scene = time_line.span("load scene", || load_scene(&request.scene))?;
+        Self::place(context, scene, request, time_line)
+    }
+
+    /// Places a scene that was loaded before.
+    pub fn place(
+        context: &Context,
+        scene: Scene,
+        request: &RenderRequest,
+        time_line: &TimeLine,
+    ) -> Result<Self, AppError> {
         let dark = EnvironmentSource::Constant(Vec3::ZERO);
         let environment = request.environment.as_ref().unwrap_or(&dark);
         let environment = time_line
-            .span("load environment", || environment::load(environment, 0.0, &EnvironmentLimits::default()))
+            .span("load environment", || {
+                let turn = request.environment_turn.to_radians();
+                environment::load(environment, turn, &EnvironmentLimits::default())
+            })
             .map_err(AppError::failed)?;
         let notes = scene
             .notes
@@ -71,9 +84,7 @@ impl Stage {
         let Some(bounds) = bounds else {
             return Err(AppError::failed(format!("at {} s no vertex of the scene is at a finite place", pose.seconds)));
         };
-        let size = UVec2::new(request.width, request.height);
-        let camera = request.camera.as_ref().map(|camera| camera.name.as_str());
-        let view = View::of_scene(&scene, &pose, camera, Some(bounds), size).map_err(AppError::failed)?;
+        let view = view(&scene, &pose, bounds, request)?;
         let bvh = time_line
             .span("build hierarchy", || Bvh::build(context, &vertices.positions, &geometry.triangles))
             .map_err(AppError::failed)?;
@@ -89,6 +100,12 @@ impl Stage {
         let acceleration = build_acceleration(context, request.rays, &world)?;
         let environment = environment.environment;
         Ok(Self { scene, geometry, rest_positions, environment, pose, bounds, view, world, bvh, acceleration })
+    }
+
+    /// Looks at the scene as `request` asks now.
+    pub fn look(&mut self, request: &RenderRequest) -> Result<(), AppError> {
+        self.view = view(&self.scene, &self.pose, self.bounds, request)?;
+        Ok(())
     }
 
     /// How rays are cast at the scene.
@@ -108,6 +125,16 @@ impl Stage {
             lights: self.pose.lights.len() as u64,
         }
     }
+}
+
+/// The free camera of the request, else the camera it names, else the scene's first, else one framed on the bounds.
+fn view(scene: &Scene, pose: &Pose, bounds: [Vec3; 2], request: &RenderRequest) -> Result<View, AppError> {
+    let size = UVec2::new(request.width, request.height);
+    if let Some(FreeCamera { eye, look_at, fov }) = request.free_camera {
+        return Ok(View::towards(eye, look_at, fov.to_radians(), size));
+    }
+    let camera = request.camera.as_ref().map(|camera| camera.name.as_str());
+    View::of_scene(scene, pose, camera, Some(bounds), size).map_err(AppError::failed)
 }
 
 /// Builds the device's own structure if it is to be used. A software driver's traversal is far slower than ours, so it
@@ -132,7 +159,7 @@ fn build_acceleration(context: &Context, rays: Rays, world: &World) -> Result<Op
     Ok(Some(structure))
 }
 
-fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
+pub fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
     let options = LoadOptions { max_memory_bytes: MAX_MEMORY_BYTES, ..LoadOptions::default() };
     match source {
         SceneSource::File(path) => crate::scene::load(path, &options).map_err(AppError::failed),

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use glam::Vec3;
 use serde_json::Value;
 
 use crate::methods::settings::suggest;
@@ -159,6 +160,25 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 /// `--exposure`.
 pub fn parse_exposure(text: &str) -> Result<f32, String> {
     number_within(text, -32.0, 32.0, "stops")
+}
+
+/// `--eye`, `--look-at`.
+pub fn parse_place(text: &str) -> Result<Vec3, String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if [x, y, z].iter().all(|number| number.abs() <= 1e9) => Ok(Vec3::new(x, y, z)),
+        _ => Err("expected X,Y,Z in metres, each within a thousand million".to_owned()),
+    }
+}
+
+/// `--fov`.
+pub fn parse_field_of_view(text: &str) -> Result<f32, String> {
+    number_within(text, 1.0, 170.0, "degrees")
+}
+
+/// `--env-turn`.
+pub fn parse_turn(text: &str) -> Result<f32, String> {
+    number_within(text, -360.0, 360.0, "degrees")
 }
 
 /// `--seconds` of `bench`.

@@ -9,16 +9,20 @@
 //! | [`lightmap`] | the display stage that filters the texels of an atlas |
 //! | [`irradiance_vector`] | the display stage that shades by the vector irradiance of elements, per pixel or per vertex |
 //! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
+//! | [`tone_map`] | what a display shows of a film |
+//! | [`interface`] | the user interface over the picture |
 //!
 //! Every stage fills a [`Film`](crate::stages::film::Film): linear radiance, direct and indirect apart. Tone mapping
-//! comes after, in [`crate::report::tonemap`].
+//! comes after: here for windows, in [`crate::report::tonemap`] for files.
 
 pub mod direct;
 pub mod final_gather;
 pub mod g_buffer;
+pub mod interface;
 pub mod irradiance_vector;
 pub mod lightmap;
 pub mod shadow_maps;
+pub mod tone_map;
 pub mod vertex;
 
 use crate::scene::camera::{Lens, View};

@@ -35,6 +35,8 @@ pub struct Options {
     pub max_storage_buffer_bytes: Option<u64>,
     /// Where the driver's pipeline cache is kept; nowhere where empty.
     pub pipeline_cache: Option<PathBuf>,
+    /// Ready to show images in windows; see [`super::Presenter`].
+    pub presents: bool,
     /// Give up on a submission after this long, seconds; 0 takes the default of ten minutes.
     pub timeout_seconds: u64,
 }
@@ -60,7 +62,7 @@ pub struct Context {
 impl Context {
     /// Opens the wanted (or best) device. Fails by name of what is missing.
     pub fn new(options: Options) -> Result<Self, GpuError> {
-        let instance = Arc::new(Instance::new(options.validation)?);
+        let instance = Arc::new(Instance::new(options.validation, options.presents)?);
         let candidate = selection::choose(selection::candidates(&instance), options.gpu.as_deref())?;
         let enabled =
             if options.no_optional_features { OptionalFeatures::default() } else { candidate.support.optional };
@@ -151,6 +153,16 @@ impl Context {
         self.device.memory_by_owner()
     }
 
+    /// Pipelines made so far.
+    pub fn pipeline_count(&self) -> u64 {
+        self.pipelines.made_count()
+    }
+
+    /// Whether the device was lost or did not finish in time: then nothing more will come of it.
+    pub fn is_lost(&self) -> bool {
+        self.device.is_lost.load(Ordering::Acquire)
+    }
+
     /// Device memory that may still be allocated, bytes.
     pub fn available_bytes(&self) -> u64 {
         self.device.available_bytes()
@@ -178,13 +190,19 @@ impl Context {
                 self.device.completed.fetch_max(value, Ordering::AcqRel);
                 Ok(())
             }
-            Err(vk::Result::TIMEOUT) => Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds }),
+            Err(vk::Result::TIMEOUT) => {
+                self.device.is_lost.store(true, Ordering::Release);
+                Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds })
+            }
             Err(error) => Err(self.with_fault(GpuError::from_call("vkWaitSemaphores", error, last_pass))),
         }
     }
 
     /// Adds what the driver tells of a device loss.
     pub(super) fn with_fault(&self, error: GpuError) -> GpuError {
+        if matches!(error, GpuError::DeviceLost { .. }) {
+            self.device.is_lost.store(true, Ordering::Release);
+        }
         match (error, &self.device.device_fault) {
             (GpuError::DeviceLost { last_pass, .. }, Some(extension)) => {
                 let mut counts = vk::DeviceFaultCountsEXT::default();

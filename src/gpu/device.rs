@@ -9,7 +9,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use std::collections::BTreeMap;
 use std::ffi::CString;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Most textures a scene may have (also bounded by the device).
@@ -52,6 +52,8 @@ pub(super) struct Device {
     /// Value of the last submission known to be complete.
     pub completed: AtomicU64,
     pub open_recorders: AtomicU64,
+    /// It was lost, or never finished: nothing more will come of it.
+    pub is_lost: AtomicBool,
     next_id: AtomicU64,
     allocator: Mutex<Option<Allocator>>,
     graveyard: Mutex<Vec<Grave>>,
@@ -93,7 +95,11 @@ impl Device {
                     || ![khr::acceleration_structure::NAME, khr::ray_query::NAME, khr::deferred_host_operations::NAME]
                         .contains(name)
             };
-            let extensions: Vec<_> = support.extensions.iter().copied().filter(skip_ray_query).collect();
+            // The swapchain needs the instance's surfaces, which are there only for programs with a window.
+            let presents = instance.surface.is_some();
+            let skip_swapchain = |name: &&std::ffi::CStr| presents || *name != khr::swapchain::NAME;
+            let extensions = support.extensions.iter().copied().filter(skip_ray_query).filter(skip_swapchain);
+            let extensions: Vec<_> = extensions.collect();
             let names: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
             let mut f = FeatureChain::enabled(optional);
             let mut create = vk::DeviceCreateInfo::default()
@@ -174,6 +180,7 @@ impl Device {
                 submitted: AtomicU64::new(0),
                 completed: AtomicU64::new(0),
                 open_recorders: AtomicU64::new(0),
+                is_lost: AtomicBool::new(false),
                 next_id: AtomicU64::new(1),
                 allocator: Mutex::new(Some(allocator)),
                 graveyard: Mutex::default(),

@@ -18,6 +18,8 @@ pub struct OptionalFeatures {
     pub calibrated_timestamps: bool,
     pub device_fault: bool,
     pub sampler_anisotropy: bool,
+    /// Images can be shown in windows.
+    pub swapchain: bool,
 }
 
 /// What a physical device offers, measured against what we need.
@@ -132,6 +134,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
             calibrated_timestamps: has(ext::calibrated_timestamps::NAME),
             device_fault: f.device_fault.device_fault != 0,
             sampler_anisotropy: core.sampler_anisotropy != 0,
+            swapchain: has(khr::swapchain::NAME),
         };
         let mut extensions = REQUIRED_EXTENSIONS.to_vec();
         extensions.extend(PROMOTED_EXTENSIONS.iter().filter(|e| has(e)));
@@ -144,6 +147,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
         add(optional.memory_budget, &[ext::memory_budget::NAME]);
         add(optional.calibrated_timestamps, &[ext::calibrated_timestamps::NAME]);
         add(optional.device_fault, &[ext::device_fault::NAME]);
+        add(optional.swapchain, &[khr::swapchain::NAME]);
         Support { missing, optional, extensions, graphics_queue_family }
     }
 }

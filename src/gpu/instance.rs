@@ -1,11 +1,21 @@
 //! The Vulkan instance: loader, layers, and validation messages caught for tests and the log.
 
 use super::error::{Checked, GpuError};
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Windows of every system that may be running.
+const SURFACE_EXTENSIONS: [&CStr; 6] = [
+    khr::surface::NAME,
+    khr::xlib_surface::NAME,
+    khr::xcb_surface::NAME,
+    khr::wayland_surface::NAME,
+    khr::win32_surface::NAME,
+    ext::metal_surface::NAME,
+];
 
 /// Messages of severity warning and error, in order.
 pub(super) type MessageLog = Arc<Mutex<Vec<String>>>;
@@ -15,13 +25,15 @@ pub(super) struct Instance {
     pub raw: ash::Instance,
     /// True when core and synchronization validation run.
     pub validation: bool,
+    /// Surfaces can be made, and asked.
+    pub surface: Option<khr::surface::Instance>,
     pub messages: MessageLog,
     /// Names and labels can be given (a layer or capture tool listens).
     pub has_debug_utils: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     // The callback's user data; freed after the messenger.
     _callback_log: Box<MessageLog>,
-    _entry: ash::Entry,
+    pub entry: ash::Entry,
 }
 
 /// Whether the Vulkan loader knows a layer of that name, switched on or not.
@@ -34,7 +46,8 @@ pub(super) fn has_layer(name: &CStr) -> bool {
 impl Instance {
     /// `validation` asks for the Khronos layer with core and synchronization checks; a missing layer is an error,
     /// so that silence always means that somebody listened.
-    pub fn new(validation: bool) -> Result<Self, GpuError> {
+    /// With `presents`, everything the loader offers for showing images in windows is on.
+    pub fn new(validation: bool, presents: bool) -> Result<Self, GpuError> {
         // SAFETY: loading the Vulkan loader runs its initialisers, as every Vulkan program does.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
         // SAFETY: plain queries and creation with structs that outlive the calls; the log box outlives the messenger.
@@ -56,6 +69,18 @@ impl Instance {
             let mut extensions = Vec::new();
             if has_debug_utils {
                 extensions.push(ext::debug_utils::NAME.as_ptr());
+            }
+            if presents {
+                let is_there = |name: &&CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(*name));
+                let found: Vec<_> = SURFACE_EXTENSIONS.iter().filter(|name| is_there(name)).collect();
+                if found.len() < 2 || !is_there(&khr::surface::NAME) {
+                    return Err(GpuError::Refused(
+                        "this Vulkan loader knows no window system (VK_KHR_surface and one of its kinds); \
+                         render without a window by `linklight render`"
+                            .into(),
+                    ));
+                }
+                extensions.extend(found.iter().map(|name| name.as_ptr()));
             }
             let mut layer_names = Vec::new();
             if validation {
@@ -111,14 +136,16 @@ impl Instance {
             } else {
                 None
             };
+            let surface = presents.then(|| khr::surface::Instance::new(&entry, &raw));
             Ok(Self {
                 raw,
                 validation,
+                surface,
                 messages,
                 has_debug_utils,
                 messenger,
                 _callback_log: callback_log,
-                _entry: entry,
+                entry,
             })
         }
     }

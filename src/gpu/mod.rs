@@ -6,6 +6,8 @@
 //! - [`Recorder::dispatch`] and [`Recorder::draw`] are the only ways to run a pass: each labels, times, counts and
 //!   synchronises it from the access that the shader declares.
 //!
+//! - [`Presenter`] shows an image in a window.
+//!
 //! What it does not do: no render graph, no asynchronous queues, no buffer device addresses (captures hide them).
 
 mod acceleration;
@@ -20,6 +22,7 @@ mod image;
 mod instance;
 mod pass;
 mod pipelines;
+mod presenter;
 mod profiler;
 mod recorder;
 pub mod reflection;
@@ -47,7 +50,8 @@ pub use error::GpuError;
 pub use features::OptionalFeatures;
 pub use image::{AddressMode, Format, Image, ImageDescription, Sampler, SamplerDescription, Shape, TextureTable};
 pub use pass::{BindingInfo, Bindings, Pass, Program, ResourceKind, Sampled, Stage, StageKind};
-pub use pipelines::{Cull, RasterState};
+pub use pipelines::{Blend, Cull, RasterState};
+pub use presenter::{Presenter, WindowSource};
 pub use profiler::{ClockPair, Cost, PassRecord};
 pub use recorder::{Load, Recorder, Target, Threads};
 pub use reload::{Reload, ShaderWatcher, reload};

@@ -8,6 +8,7 @@ use ash::vk;
 use std::collections::HashMap;
 use std::io::Write as _;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// Which triangles a raster pass drops.
@@ -19,14 +20,22 @@ pub enum Cull {
     Back,
 }
 
+/// How a raster pass's colours meet those of the image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Blend {
+    #[default]
+    Replace,
+    /// Colours are premultiplied by their alpha and laid over.
+    Over,
+}
+
 /// Fixed-function state of a raster pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct RasterState {
     pub cull: Cull,
     /// Draw only what is nearer than the depth image, and write it. Depth is reversed everywhere: 1 near, 0 far.
     pub depth_test: bool,
-    /// Add to the colour image instead of replacing it.
-    pub additive: bool,
+    pub blend: Blend,
     /// Draw lines along triangle edges' vertices (line list) instead of triangles.
     pub lines: bool,
 }
@@ -61,6 +70,7 @@ pub(super) struct Pipelines {
     pipelines: Mutex<HashMap<Key, vk::Pipeline>>,
     /// SPIR-V of reloaded shaders by file, in place of what was built in.
     reloaded: Mutex<HashMap<&'static str, Vec<u32>>>,
+    made: AtomicU64,
 }
 
 impl Pipelines {
@@ -99,6 +109,7 @@ impl Pipelines {
             layouts: Mutex::default(),
             pipelines: Mutex::default(),
             reloaded: Mutex::default(),
+            made: AtomicU64::new(0),
         })
     }
 
@@ -133,6 +144,11 @@ impl Pipelines {
         self.device.bury(Grave::Pipelines(old));
     }
 
+    /// How many were made so far; none should be once a program is warm.
+    pub fn made_count(&self) -> u64 {
+        self.made.load(Ordering::Relaxed)
+    }
+
     fn find_or_make(
         &self,
         key: Key,
@@ -145,6 +161,7 @@ impl Pipelines {
         }
         let start = std::time::Instant::now();
         let pipeline = make()?;
+        self.made.fetch_add(1, Ordering::Relaxed);
         self.device.set_name(pipeline, key.program);
         tracing::debug!("pipeline {} made in {:.1} ms", key.program, start.elapsed().as_secs_f64() * 1e3);
         lock(&self.pipelines).insert(key, pipeline);
@@ -300,12 +317,12 @@ impl Pipelines {
             .depth_write_enable(state.depth_test)
             .depth_compare_op(vk::CompareOp::GREATER);
         let blend = vk::PipelineColorBlendAttachmentState {
-            blend_enable: vk::Bool32::from(state.additive),
+            blend_enable: vk::Bool32::from(state.blend == Blend::Over),
             src_color_blend_factor: vk::BlendFactor::ONE,
-            dst_color_blend_factor: vk::BlendFactor::ONE,
+            dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
             color_blend_op: vk::BlendOp::ADD,
             src_alpha_blend_factor: vk::BlendFactor::ONE,
-            dst_alpha_blend_factor: vk::BlendFactor::ONE,
+            dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
             alpha_blend_op: vk::BlendOp::ADD,
             color_write_mask: vk::ColorComponentFlags::RGBA,
         };

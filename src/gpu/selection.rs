@@ -119,6 +119,6 @@ pub fn choose_device<'d>(devices: &'d [DeviceInfo], wanted: Option<&str>) -> Res
 
 /// Every device, usable or not, for `linklight devices`.
 pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(false, false)?;
     Ok(candidates(&instance).into_iter().map(|c| c.info).collect())
 }

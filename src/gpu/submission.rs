@@ -18,8 +18,17 @@ impl Recorder<'_> {
         self.finish().map(drop)
     }
 
+    /// As [`Self::submit`], after `wait` and before `signal`: binary semaphores of the window system.
+    pub(super) fn submit_between(mut self, wait: vk::Semaphore, signal: vk::Semaphore) -> Result<(), GpuError> {
+        self.finish_between(Some((wait, signal))).map(drop)
+    }
+
     /// As [`Self::submit`], handing back the staging buffers (read-backs) in the order they were kept.
     pub(super) fn finish(&mut self) -> Result<Vec<RawBuffer>, GpuError> {
+        self.finish_between(None)
+    }
+
+    fn finish_between(&mut self, between: Option<(vk::Semaphore, vk::Semaphore)>) -> Result<Vec<RawBuffer>, GpuError> {
         if let Some(error) = self.error.take() {
             return Err(error);
         }
@@ -40,12 +49,19 @@ impl Recorder<'_> {
             let value = {
                 let _queue = lock(&self.context.queue_lock);
                 let value = device.submitted.load(Ordering::Acquire) + 1;
-                let values = [value];
-                let mut timeline = vk::TimelineSemaphoreSubmitInfo::default().signal_semaphore_values(&values);
-                let (buffers, semaphores) = ([commands], [device.timeline]);
+                // Values of binary semaphores are ignored.
+                let (wait_values, values) = ([0], [value, 0]);
+                let (wait, signal) = between.unwrap_or_default();
+                let (waited, count) = if between.is_some() { (1, 2) } else { (0, 1) };
+                let mut timeline = vk::TimelineSemaphoreSubmitInfo::default()
+                    .wait_semaphore_values(&wait_values[..waited])
+                    .signal_semaphore_values(&values[..count]);
+                let (buffers, waits, signals) = ([commands], [wait], [device.timeline, signal]);
                 let submit = vk::SubmitInfo::default()
+                    .wait_semaphores(&waits[..waited])
+                    .wait_dst_stage_mask(&[vk::PipelineStageFlags::ALL_COMMANDS][..waited])
                     .command_buffers(&buffers)
-                    .signal_semaphores(&semaphores)
+                    .signal_semaphores(&signals[..count])
                     .push_next(&mut timeline);
                 device
                     .raw

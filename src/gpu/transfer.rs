@@ -210,6 +210,26 @@ impl Recorder<'_> {
         self.keep(staging);
     }
 
+    /// Sets every pixel of a colour image.
+    pub fn clear_image(&mut self, image: &Image, color: [f32; 4]) {
+        let access = [Access { id: image.id(), reads: false, writes: true }];
+        let cost = Cost { bytes_read: 0, bytes_written: image.size_bytes() };
+        let device = self.context().device.clone();
+        self.timed("transfer/clear", &access, cost, 0, None, |recorder| {
+            let value = vk::ClearColorValue { float32: color };
+            // SAFETY: the image is alive and in GENERAL.
+            unsafe {
+                device.raw.cmd_clear_color_image(
+                    recorder.commands(),
+                    image.raw(),
+                    vk::ImageLayout::GENERAL,
+                    &value,
+                    &[image.whole_range()],
+                );
+            }
+        });
+    }
+
     /// Fills mip levels 1.. by halving, averaged in linear light (sRGB images are decoded by the blit).
     pub fn generate_mips(&mut self, image: &Image) {
         let device = self.context().device.clone();

@@ -67,6 +67,9 @@ const FRAMED_SIDE: Vec3 = Vec3::new(0.55, 0.4, 1.0);
 /// Room left around the bounds, as a factor of the distance.
 const FRAMED_MARGIN: f32 = 1.05;
 
+/// The near plane of a view towards a place, as a share of the distance to it.
+const NEAR_SHARE: f32 = 1e-3;
+
 impl View {
     /// The view of camera `wanted` (name of a camera or of its node, or position among the nodes with cameras), of
     /// the first camera when nothing is wanted, and framed on `bounds` when the scene has none.
@@ -132,6 +135,14 @@ impl View {
         let distance = distance * FRAMED_MARGIN;
         let near = (distance - radius).max(distance * 1e-3) * 0.5;
         Self { position: centre - forward * distance, near, ..view }
+    }
+
+    /// From `eye` towards `target`, the world's up upwards, with a vertical field of view in radians.
+    pub fn towards(eye: Vec3, target: Vec3, fov_y: f32, size: UVec2) -> Self {
+        let forward = (target - eye).try_normalize().unwrap_or(Vec3::NEG_Z);
+        // So near that what is looked at is never cut, and yet far from zero.
+        let near = (eye.distance(target) * NEAR_SHARE).max(f32::MIN_POSITIVE);
+        Self::looking(eye, forward, Vec3::Y, perspective(fov_y, aspect(size)), near, None)
     }
 
     fn looking(position: Vec3, forward: Vec3, up: Vec3, lens: Lens, near: f32, far: Option<f32>) -> Self {

@@ -1,0 +1,220 @@
+//! Between the window and the thread that renders: the newest request goes one way, films and progress the other.
+//! The window never waits.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::engine::{Depth, Engine, change};
+use crate::app::AppError;
+use crate::app::frame::SAMPLING_TASKS;
+use crate::app::render::RenderRequest;
+use crate::report::profile::SceneFacts;
+use crate::scene::camera::View;
+use crate::stages::film::Film;
+use crate::stages::work::{Interrupted, Watch};
+
+/// How often progress is told.
+const PROGRESS_INTERVAL: Duration = Duration::from_millis(50);
+
+/// A picture that is wanted.
+#[derive(Clone)]
+pub struct Job {
+    pub request: RenderRequest,
+    /// One sample a pixel, and not to be left half-way: the picture while something moves.
+    pub is_preview: bool,
+}
+
+/// A picture that is there.
+pub struct Shown {
+    pub film: Arc<Film>,
+    pub job: Job,
+    pub view: View,
+    /// World-space corners of the scene.
+    pub bounds: [glam::Vec3; 2],
+    pub facts: SceneFacts,
+    /// Of the scene's longest clip; 0 where nothing moves.
+    pub duration: f32,
+    /// Of the scene's cameras.
+    pub cameras: Vec<String>,
+    /// From request to film.
+    pub milliseconds: f64,
+}
+
+/// What the work says while it lasts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Progress {
+    pub task: String,
+    pub done: u64,
+    pub total: u64,
+}
+
+/// What has become of the work since it was last asked.
+#[derive(Default)]
+pub struct News {
+    pub shown: Option<Shown>,
+    /// Why there is no picture.
+    pub failure: Option<String>,
+    pub progress: Option<Progress>,
+    pub is_working: bool,
+    /// The GPU is gone: nothing more will come.
+    pub end: Option<AppError>,
+}
+
+#[derive(Default)]
+struct Papers {
+    job: Option<Job>,
+    news: News,
+    is_cancelled: bool,
+    is_closing: bool,
+}
+
+/// Shared by the two threads.
+pub struct Desk {
+    papers: Mutex<Papers>,
+    wake: Condvar,
+    /// Called when there is news.
+    tell: Box<dyn Fn() + Send + Sync>,
+}
+
+impl Desk {
+    pub fn new(tell: impl Fn() + Send + Sync + 'static) -> Self {
+        Self { papers: Mutex::default(), wake: Condvar::new(), tell: Box::new(tell) }
+    }
+
+    /// Asks for a picture in place of any that was asked for and not begun.
+    pub fn ask(&self, job: Job) {
+        let mut papers = self.lock();
+        papers.job = Some(job);
+        papers.is_cancelled = false;
+        papers.news.is_working = true;
+        papers.news.failure = None;
+        drop(papers);
+        self.wake.notify_all();
+    }
+
+    /// Ends the work that is being done, without a picture.
+    pub fn cancel(&self) {
+        let mut papers = self.lock();
+        papers.is_cancelled = true;
+        papers.job = None;
+    }
+
+    /// Ends the other thread.
+    pub fn close(&self) {
+        self.lock().is_closing = true;
+        self.wake.notify_all();
+    }
+
+    /// What has happened since the last call; progress and failure stay until something newer comes.
+    pub fn news(&self) -> News {
+        let mut papers = self.lock();
+        let news = &mut papers.news;
+        News {
+            shown: news.shown.take(),
+            failure: news.failure.clone(),
+            progress: news.progress.clone(),
+            is_working: news.is_working,
+            end: news.end.take(),
+        }
+    }
+
+    /// Whether a picture or a failure has come that was not taken yet.
+    pub fn news_are_waiting(&self) -> bool {
+        let papers = self.lock();
+        papers.news.shown.is_some() || papers.news.end.is_some() || papers.news.is_working
+    }
+
+    /// Renders what is asked for until closed.
+    pub fn work(&self, mut engine: Engine<'_>) {
+        while let Some(job) = self.next() {
+            let start = Instant::now();
+            let watch = DeskWatch { desk: self, job: &job, told: Mutex::new(start) };
+            let result = engine.render(&job.request, &watch);
+            let mut papers = self.lock();
+            papers.news.progress = None;
+            papers.news.is_working = papers.job.is_some();
+            match (result, engine.stage()) {
+                (Ok(film), Some(stage)) => {
+                    papers.news.shown = Some(Shown {
+                        film,
+                        view: stage.view,
+                        bounds: stage.bounds,
+                        facts: stage.facts(),
+                        duration: stage.scene.clips.iter().map(|clip| clip.duration).fold(0.0, f32::max),
+                        cameras: stage.scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
+                        milliseconds: start.elapsed().as_secs_f64() * 1e3,
+                        job,
+                    });
+                }
+                (Ok(_), None) => {}
+                (Err(AppError::Interrupted(_)), _) if papers.job.is_some() => {}
+                (Err(error), _) if engine.is_lost() => papers.news.end = Some(error),
+                (Err(error), _) if is_interruption(&error) && papers.job.is_some() => {}
+                (Err(error), _) if is_interruption(&error) => papers.news.failure = Some("cancelled".into()),
+                (Err(error), _) => papers.news.failure = Some(error.to_string()),
+            }
+            drop(papers);
+            (self.tell)();
+        }
+    }
+
+    fn next(&self) -> Option<Job> {
+        let mut papers = self.lock();
+        loop {
+            if papers.is_closing {
+                return None;
+            }
+            if let Some(job) = papers.job.take() {
+                return Some(job);
+            }
+            papers = self.wake.wait(papers).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Papers> {
+        self.papers.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Methods wrap the interruption in errors of their own.
+fn is_interruption(error: &AppError) -> bool {
+    let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
+    while let Some(error) = cause {
+        if error.is::<Interrupted>() || error.to_string() == Interrupted.to_string() {
+            return true;
+        }
+        cause = error.source();
+    }
+    false
+}
+
+struct DeskWatch<'d> {
+    desk: &'d Desk,
+    job: &'d Job,
+    told: Mutex<Instant>,
+}
+
+impl Watch for DeskWatch<'_> {
+    fn step(&self, task: &str, done: u64, total: u64) -> Result<(), Interrupted> {
+        let mut papers = self.desk.lock();
+        if papers.is_closing || papers.is_cancelled {
+            return Err(Interrupted);
+        }
+        // A newer request makes this work vain where it needs other links, or where the work is one picture of many.
+        if let Some(newer) = &papers.job {
+            let depth = change(&self.job.request, &newer.request);
+            let is_sampling = SAMPLING_TASKS.contains(&task) && !self.job.is_preview;
+            if depth >= Some(Depth::Method) || (is_sampling && depth.is_some()) {
+                return Err(Interrupted);
+            }
+        }
+        papers.news.progress = Some(Progress { task: task.to_owned(), done, total });
+        drop(papers);
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if told.elapsed() >= PROGRESS_INTERVAL {
+            *told = Instant::now();
+            (self.desk.tell)();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,163 @@
+//! From a request to a film, frame after frame: does again only what the request changed since the last one, by the
+//! same code as `linklight render`.
+
+use std::sync::Arc;
+
+use crate::app::AppError;
+use crate::app::frame::Method;
+use crate::app::render::RenderRequest;
+use crate::app::stage::{Stage, load_scene};
+use crate::gpu::Context;
+use crate::report::trace::TimeLine;
+use crate::scene::Scene;
+use crate::stages::film::Film;
+use crate::stages::work::Watch;
+
+/// How deep a change of the request goes; each needs what stands after it too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Depth {
+    /// The view, or what a frame solves.
+    Frame,
+    /// What the display stage keeps: buffers of the picture's size.
+    Display,
+    /// What the method prepares: links, maps, clusters.
+    Method,
+    /// Where the scene stands on the device.
+    Stage,
+    /// The scene's file.
+    Scene,
+}
+
+/// What `new` asks to be done anew when `old` is there; `None` where only the tone mapping of the same film differs.
+pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
+    let tessellates = |r: &RenderRequest| r.display.is_some() && r.method.key != "surface-shadow-maps";
+    let is_traced = new.method.key == "path-tracing";
+    if old.scene != new.scene {
+        Some(Depth::Scene)
+    } else if old.environment != new.environment
+        || old.environment_turn != new.environment_turn
+        || old.diffuse != new.diffuse
+        || old.elements != new.elements
+        || old.rays != new.rays
+        || old.seconds != new.seconds
+        || tessellates(old) != tessellates(new)
+    {
+        Some(Depth::Stage)
+    } else if old.method.key != new.method.key || old.assignments != new.assignments || old.seed != new.seed {
+        Some(Depth::Method)
+    } else if (old.width, old.height) != (new.width, new.height)
+        || old.display != new.display
+        || old.display_assignments != new.display_assignments
+        // The gather stops where the tone map shows no difference.
+        || (old.tone != new.tone && shows_by_tone(new))
+        || (is_traced && old.bounces != new.bounces)
+    {
+        Some(Depth::Display)
+    } else if old.camera != new.camera
+        || old.free_camera != new.free_camera
+        || old.bounces != new.bounces
+        || old.spp != new.spp
+    {
+        Some(Depth::Frame)
+    } else {
+        None
+    }
+}
+
+/// Whether the film itself depends on the tone map.
+fn shows_by_tone(request: &RenderRequest) -> bool {
+    request.display == Some(crate::app::cli::Display::FinalGather)
+}
+
+/// A scene on the device with a method prepared, and the films it renders into.
+pub struct Engine<'c> {
+    context: &'c Context,
+    time_line: TimeLine,
+    scene: Option<Scene>,
+    stage: Option<Stage>,
+    method: Option<Method>,
+    /// What scene, stage and method were made for.
+    last: Option<RenderRequest>,
+    /// What an error left to be done.
+    owed: Depth,
+    films: Vec<Arc<Film>>,
+}
+
+impl<'c> Engine<'c> {
+    pub fn new(context: &'c Context) -> Self {
+        let time_line = TimeLine::default();
+        Self {
+            context,
+            time_line,
+            scene: None,
+            stage: None,
+            method: None,
+            last: None,
+            owed: Depth::Scene,
+            films: Vec::new(),
+        }
+    }
+
+    pub fn is_lost(&self) -> bool {
+        self.context.is_lost()
+    }
+
+    /// The scene as it stands for the last frame.
+    pub fn stage(&self) -> Option<&Stage> {
+        self.stage.as_ref()
+    }
+
+    /// Renders what `request` asks for. After an error what was whole before stays, and the rest is made when it is
+    /// asked for again.
+    pub fn render(&mut self, request: &RenderRequest, watch: &dyn Watch) -> Result<Arc<Film>, AppError> {
+        let changed = self.last.as_ref().map_or(Some(Depth::Scene), |last| change(last, request));
+        let depth = changed.unwrap_or(Depth::Frame).max(self.owed);
+        self.owed = depth;
+        self.last = Some(request.clone());
+        // What is made anew goes first: two may not fit.
+        if depth >= Depth::Method {
+            self.method = None;
+        }
+        if depth >= Depth::Stage {
+            self.scene = self.stage.take().map(|stage| stage.scene).or(self.scene.take());
+        }
+        if depth == Depth::Scene {
+            self.scene = None;
+        }
+
+        if depth >= Depth::Stage {
+            watch.step("placing the scene", 0, 1)?;
+            let scene = match self.scene.take() {
+                Some(scene) => scene,
+                None => load_scene(&request.scene)?,
+            };
+            self.stage = Some(Stage::place(self.context, scene, request, &self.time_line)?);
+        }
+        let film = self.film(request.width, request.height)?;
+        let Some(stage) = &mut self.stage else { return Err(AppError::failed("the scene was not placed")) };
+        stage.look(request)?;
+        match &mut self.method {
+            Some(method) if depth >= Depth::Display => method.show(self.context, request, stage)?,
+            Some(_) => {}
+            none => {
+                watch.step("preparing", 0, 1)?;
+                *none = Some(Method::prepare(self.context, request, stage, watch)?);
+            }
+        }
+        let Some(method) = &mut self.method else { return Err(AppError::failed("the method was not prepared")) };
+        method.frame(self.context, request, stage, &film, watch)?;
+        self.owed = Depth::Frame;
+        Ok(film)
+    }
+
+    /// A film of that size that nobody looks at.
+    fn film(&mut self, width: u32, height: u32) -> Result<Arc<Film>, AppError> {
+        self.films.retain(|film| (film.width, film.height) == (width, height));
+        if let Some(film) = self.films.iter().find(|film| Arc::strong_count(film) == 1) {
+            return Ok(Arc::clone(film));
+        }
+        let film = Arc::new(Film::new(self.context, width, height)?);
+        self.films.push(Arc::clone(&film));
+        Ok(film)
+    }
+}

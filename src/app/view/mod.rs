@@ -1,0 +1,71 @@
+//! `linklight view`: a scene in a window, rendered by the same code as `linklight render`.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`engine`] | from a request to a film, doing again only what changed |
+//! | [`desk`] | between the window's thread and the one that renders |
+//! | [`window`] | the window: events in, frames out |
+//! | [`viewer`] | what the user did: the state that decides the picture |
+//! | [`panel`] | the panel beside the picture |
+//! | [`settings`] | a widget for every setting, from its declaration |
+//! | [`camera`] | orbit and fly |
+//!
+//! The window's thread only ever draws the last film and the interface, so link generation never stops it.
+
+mod camera;
+mod desk;
+mod engine;
+mod panel;
+mod settings;
+mod viewer;
+mod window;
+
+use std::sync::Arc;
+
+use winit::event_loop::EventLoop;
+
+use super::AppError;
+use super::cli::{Global, ViewArgs};
+use super::render::{check_validation, pipeline_cache};
+use crate::gpu::{Context, Options};
+use desk::Desk;
+use engine::Engine;
+use viewer::Viewer;
+use window::ViewWindow;
+
+/// Opens the window and stays until it is closed.
+pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
+    if !args.shots.is_dir() {
+        return Err(AppError::Usage(format!("--shots {} is no folder; make it first", args.shots.display())));
+    }
+    let viewer = Viewer::new(args)?;
+    let no_window = |error: winit::error::EventLoopError| {
+        AppError::failed(format!("no window can be opened ({error}); `linklight render` needs none"))
+    };
+    let event_loop = EventLoop::<()>::with_user_event().build().map_err(no_window)?;
+    let proxy = event_loop.create_proxy();
+    let options = Options {
+        gpu: global.gpu.clone(),
+        validation: global.validate,
+        presents: true,
+        statistics: true,
+        pipeline_cache: pipeline_cache(),
+        ..Options::default()
+    };
+    let context = Context::new(options)?;
+    let info = context.info();
+    tracing::info!("device {} {} ({})", info.index, info.name, info.driver);
+    // A closed event loop needs no news.
+    let desk = Arc::new(Desk::new(move || {
+        let _ = proxy.send_event(());
+    }));
+    let result = std::thread::scope(|scope| {
+        let renderer = std::thread::Builder::new().name("renderer".into());
+        renderer.spawn_scoped(scope, || desk.work(Engine::new(&context)))?;
+        let mut window = ViewWindow::new(&context, &desk, viewer);
+        let result = event_loop.run_app(&mut window).map_err(no_window);
+        desk.close();
+        window.finish().and(result)
+    });
+    result.and_then(|()| check_validation(&context))
+}
