@@ -16,8 +16,11 @@ pub struct Interface {
     /// Left, top, right, bottom in pixels.
     clips: Buffer<[f32; 4]>,
     glyphs: Image,
-    /// The texture's pixels, which egui sends in pieces.
+    /// The texture's pixels, which egui sends in pieces, and their width and height.
     pixels: Vec<[u8; 4]>,
+    size: [u32; 2],
+    /// The device has not seen the pixels yet.
+    is_changed: bool,
     sampler: Sampler,
     index_count: u32,
 }
@@ -30,21 +33,22 @@ impl Interface {
             clips: context.buffer("interface/clips", 1)?,
             glyphs: glyphs(context, [1, 1])?,
             pixels: vec![[255; 4]],
+            size: [1, 1],
+            is_changed: true,
             sampler: context.sampler("interface/glyphs", SamplerDescription::LINEAR_CLAMP)?,
             index_count: 0,
         })
     }
 
-    /// Takes what egui wants painted: `primitives` at so many pixels per point, and what changed of its texture.
+    /// Takes what egui wants painted: `primitives` at so many pixels per point.
     pub fn update(
         &mut self,
         context: &Context,
         recorder: &mut Recorder<'_>,
         primitives: &[ClippedPrimitive],
-        textures: &egui::TexturesDelta,
         pixels_per_point: f32,
     ) -> Result<(), GpuError> {
-        self.update_glyphs(context, recorder, textures)?;
+        self.update_glyphs(context, recorder)?;
         let (mut corners, mut indices, mut clips) = (Vec::new(), Vec::new(), Vec::new());
         for ClippedPrimitive { clip_rect, primitive } in primitives {
             let Primitive::Mesh(mesh) = primitive else { continue };
@@ -84,27 +88,19 @@ impl Interface {
         recorder.draw(&pass, &target, state, self.index_count, 1);
     }
 
-    fn update_glyphs(
-        &mut self,
-        context: &Context,
-        recorder: &mut Recorder<'_>,
-        textures: &egui::TexturesDelta,
-    ) -> Result<(), GpuError> {
-        // The interface uses no pictures of its own, so the only texture is the one of glyphs.
-        let deltas = textures.set.get(&egui::TextureId::default());
-        for delta in deltas.into_iter().flatten() {
+    /// Puts what egui changed of its texture into our copy. The interface uses no pictures of its own, so the only
+    /// texture is the one of glyphs.
+    pub fn take_textures(&mut self, mut textures: egui::TexturesDelta) {
+        for delta in textures.set.remove(&egui::TextureId::default()).into_iter().flatten() {
             let ImageData::Color(image) = &delta.image;
             let [width, height] = image.size;
-            let size = [width as u32, height as u32];
             match delta.pos {
                 None => {
-                    if [self.glyphs.width, self.glyphs.height] != size {
-                        self.glyphs = glyphs(context, size)?;
-                    }
+                    self.size = [width as u32, height as u32];
                     self.pixels = image.pixels.iter().map(|color| color.to_array()).collect();
                 }
                 Some([left, top]) => {
-                    let stride = self.glyphs.width as usize;
+                    let stride = self.size[0] as usize;
                     for (row, colors) in image.pixels.chunks(width.max(1)).enumerate() {
                         let start = (top + row) * stride + left;
                         let target = self.pixels.get_mut(start..start + colors.len()).unwrap_or_default();
@@ -112,8 +108,16 @@ impl Interface {
                     }
                 }
             }
+            self.is_changed = true;
         }
-        if deltas.is_some() {
+        textures.clear();
+    }
+
+    fn update_glyphs(&mut self, context: &Context, recorder: &mut Recorder<'_>) -> Result<(), GpuError> {
+        if std::mem::take(&mut self.is_changed) {
+            if [self.glyphs.width, self.glyphs.height] != self.size {
+                self.glyphs = glyphs(context, self.size)?;
+            }
             recorder.write_image(&self.glyphs, 0, &self.pixels);
         }
         Ok(())

@@ -33,6 +33,14 @@ use engine::Engine;
 use viewer::Viewer;
 use window::ViewWindow;
 
+struct Closing<'d>(&'d Desk);
+
+impl Drop for Closing<'_> {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
 /// Opens the window and stays until it is closed.
 pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     if !args.shots.is_dir() {
@@ -62,9 +70,10 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     let result = std::thread::scope(|scope| {
         let renderer = std::thread::Builder::new().name("renderer".into());
         renderer.spawn_scoped(scope, || desk.work(Engine::new(&context)))?;
+        // However this ends, the renderer is not left waiting.
+        let _closing = Closing(&desk);
         let mut window = ViewWindow::new(&context, &desk, viewer);
         let result = event_loop.run_app(&mut window).map_err(no_window);
-        desk.close();
         window.finish().and(result)
     });
     result.and_then(|()| check_validation(&context))

@@ -89,7 +89,8 @@ impl<'c> ViewWindow<'c> {
         self.viewer.take_news(self.desk)?;
         let input = open.input.take_egui_input(&open.window);
         let viewer = &mut self.viewer;
-        let output = self.egui.run_ui(input, |ui| viewer.interface(ui, self.desk));
+        let mut output = self.egui.run_ui(input, |ui| viewer.interface(ui, self.desk));
+        open.interface.take_textures(std::mem::take(&mut output.textures_delta));
         open.input.handle_platform_output(&open.window, output.platform_output);
         self.viewer.do_actions(self.context, self.desk)?;
         let primitives = self.egui.tessellate(output.shapes, output.pixels_per_point);
@@ -106,8 +107,7 @@ impl<'c> ViewWindow<'c> {
                 open.tone_mapping.draw(recorder, film, parts, tone, &open.frame, corner);
             });
         }
-        let delta = &output.textures_delta;
-        open.interface.update(self.context, &mut recorder, &primitives, delta, output.pixels_per_point)?;
+        open.interface.update(self.context, &mut recorder, &primitives, output.pixels_per_point)?;
         open.interface.draw(&mut recorder, &open.frame);
         if std::mem::take(&mut self.viewer.wants_new_surface) {
             open.presenter.lose_surface(self.context);
