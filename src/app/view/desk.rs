@@ -147,7 +147,6 @@ impl Desk {
                     });
                 }
                 (Ok(_), None) => {}
-                (Err(AppError::Interrupted(_)), _) if papers.job.is_some() => {}
                 (Err(error), _) if engine.is_lost() => papers.news.end = Some(error),
                 (Err(error), _) if is_interruption(&error) && papers.job.is_some() => {}
                 (Err(error), _) if is_interruption(&error) => papers.news.failure = Some("cancelled".into()),
@@ -178,6 +177,9 @@ impl Desk {
 
 /// Methods wrap the interruption in errors of their own.
 fn is_interruption(error: &AppError) -> bool {
+    if matches!(error, AppError::Partial(_)) {
+        return true;
+    }
     let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(error);
     while let Some(error) = cause {
         if error.is::<Interrupted>() || error.to_string() == Interrupted.to_string() {
