@@ -118,7 +118,7 @@ fn stages(_: &mut Criterion) {
                 share(frame.illumination),
                 frame.total(),
                 report.pairs_visited as f64 / frame.create * 1e-3,
-                report.pairs_linked as f64 / frame.create * 1e-3,
+                report.links_proposed as f64 / frame.create * 1e-3,
             );
         }
     }

@@ -21,6 +21,24 @@ struct WindowLevel {
     uint row;           // of the first node, in the table of bins
 };
 
+// Up to 16 neighbouring nodes of one level that receive together: what all of them look at is decided once, for the node
+// above that they are below.
+struct ReceiverGroup {
+    uint first;         // node
+    uint count;
+    uint node;          // two levels further up, or the root
+    uint above_first;   // the same of the parents' group
+    uint above_count;   // 0: nothing above receives in this window
+    uint above_node;
+};
+
+// What was counted while links were made.
+struct LinkCounts {
+    uint visited;       // pairs of nodes
+    uint proposed;      // of these, links
+    uint kept;          // bins of leaves that have a winner
+};
+
 vec3 turn(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 vec3 turn_back(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) - q.w * v); }
 

@@ -1,11 +1,10 @@
 #ifndef LIB_FOOTPRINT
 #define LIB_FOOTPRINT
-// Which bins of a receiver a surfel fills, and how far away it is there.                            [Dong2007 4.2.2]
+// Which bins of a receiver a sender may fill.                                                      [Dong2007 4.2.2]
 //
-// Bridge: the kernel takes each bin's proposal.
+// Bridge: the kernel looks which of a rectangle of cells of a face it fills; both ends belong to the ranges.
 #include "lib/bins.glsl"
-#include "lib/quadtree.glsl"
-void propose(uint bin, float distance_there);
+void look_at(uint face, ivec2 columns, ivec2 rows);
 
 // Range of x / z over a sphere around (x, z) seen from the origin, clamped to -1..1; empty where it lies behind.
 vec2 slope_range(float x, float z, float radius)
@@ -24,13 +23,11 @@ ivec2 cells_between(vec2 range, uint n)
     return clamp(ivec2(ceil(at.x), floor(at.y)), ivec2(0, -1), ivec2(n, int(n) - 1));
 }
 
-// Proposes the surfel to each bin whose central direction meets its ellipse. `offset` leads from the receiver to the
-// centre, all in the receiver's frame; `reach` bounds the ellipse.
-void propose_footprint(vec3 offset, vec3 normal, vec3 g1, vec3 g2, float reach, uint n)
+// Looks at the bins whose centres a sphere of radius `reach` at `offset` may cover.
+void look_around(vec3 offset, float reach, uint n)
 {
-    float plane = dot(normal, offset);
     bool is_inside = dot(offset, offset) <= reach * reach;
-    // The face that the centre lies in first: few surfels reach over to others.
+    // The face that the centre lies in first: few senders reach over to others.
     uint main_face = face_of(offset), face = main_face;
     for (uint k = 0; k < 6; ++k) {
         vec3 at = in_face(face, offset);
@@ -40,18 +37,7 @@ void propose_footprint(vec3 offset, vec3 normal, vec3 g1, vec3 g2, float reach, 
             range_v = slope_range(at.y, at.z, reach);
         }
         ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
-        for (int y = rows.x; y <= rows.y; ++y) {
-            for (int x = columns.x; x <= columns.y; ++x) {
-                vec3 direction = face_direction(face, vec2(cell_centre(uint(x), n), cell_centre(uint(y), n)));
-                float slope = dot(normal, direction);
-                if (slope * plane <= 0.0) continue;     // parallel, or met behind the receiver
-                float t = plane / slope;
-                vec3 from_centre = t * direction - offset;
-                float a = dot(g1, from_centre), b = dot(g2, from_centre);
-                if (a * a + b * b <= 1.0)
-                    propose((face * n + uint(y)) * n + uint(x), t * length(direction));
-            }
-        }
+        if (columns.x <= columns.y && rows.x <= rows.y) look_at(face, columns, rows);
         bool stays = range_u.x > -1.0 && range_u.y < 1.0 && range_v.x > -1.0 && range_v.y < 1.0;
         if (k == 0 && stays) break;
         face = k < main_face ? k : k + 1;       // then all others in turn

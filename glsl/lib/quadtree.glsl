@@ -35,6 +35,29 @@ struct SurfelMoments {
     vec3 across;        // sum of normals times area, m2
 };
 
+// The surface of a leaf: the part of the triangles around its vertex that is nearer to it, by barycentric coordinates,
+// than to their other corners.
+struct LeafCell {
+    vec3 vertex;        // m
+    uint first_corner;
+    uint corner_count;
+    uint sides;         // CELL_OF_BACK, CELL_HAS_OTHER_SIDE
+};
+const uint CELL_OF_BACK = 1;            // it looks against the triangles' normals
+const uint CELL_HAS_OTHER_SIDE = 2;     // another leaf looks the other way
+
+// A triangle around a vertex: its other corners, in order, m.
+struct CellCorner {
+    vec3 p;
+    vec3 q;
+};
+
+// A step of the walk over all nodes from the roots down: where it goes on where a node's children are not looked at.
+struct WalkStep {
+    uint node;
+    uint skip;
+};
+
 // Children of a node: the first, and how many.
 uvec2 quadtree_children(QuadtreeSegment s, uint node)
 {

@@ -5,7 +5,8 @@
 
 // One thread per leaf: the surfel of its element, from the third of each triangle around that belongs to it.   [Dong2007 4.1]
 // reads leaf_elements[leaf_count], element_vertices, element_normals [element_count], positions, triangles,
-// incident_offsets[vertex_count + 1], incident_triangles   writes surfels, moments [leaf_count ..]   shared none
+// incident_offsets[vertex_count + 1], incident_triangles, back_elements[vertex_count]
+// writes surfels, moments [leaf_count ..], leaf_cells[leaf_count], cell_corners (as incident_triangles)   shared none
 // Differs from [Dong2007]: an ellipse about the middle of the vertex's cell instead of a disc about the vertex, so that
 // cells on edges and long cells cover no more than is there, and all of it.
 layout(local_size_x = 64) in;
@@ -18,6 +19,9 @@ layout(set = 0, binding = 5, scalar) readonly buffer IncidentOffsets { uint inci
 layout(set = 0, binding = 6, scalar) readonly buffer IncidentTriangles { uint incident_triangles[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Surfels { Surfel surfels[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Moments { SurfelMoments moments[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer BackElements { uint back_elements[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer LeafCells { LeafCell leaf_cells[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer CellCorners { CellCorner cell_corners[]; };
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
 
 void main()
@@ -29,6 +33,9 @@ void main()
     uint vertex = vertex_of(entry);
     uint first = incident_offsets[vertex], last = incident_offsets[vertex + 1];
     vec3 origin = positions[vertex];
+    bool is_back = side_of(entry) < 0.0;
+    leaf_cells[leaf] = LeafCell(origin, first, last - first,
+                                (is_back ? CELL_OF_BACK : 0u) | (back_elements[vertex] != NO_ELEMENT ? CELL_HAS_OTHER_SIDE : 0u));
 
     // Sums over the cell with the vertex as origin. A corner's third of a triangle is a quadrangle: the corner, the
     // middles of its two edges, the centroid; cut in two along the line from the corner, each half a sixth.
@@ -39,8 +46,10 @@ void main()
         vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
         vec3 across = cross(b - a, c - a);
         float sixth = 0.5 * length(across) / 6.0;
-        vec3 p = (v.x == vertex ? b : v.y == vertex ? c : a) - origin;
-        vec3 q = (v.x == vertex ? c : v.y == vertex ? a : b) - origin;
+        vec3 p = v.x == vertex ? b : v.y == vertex ? c : a, q = v.x == vertex ? c : v.y == vertex ? a : b;
+        if (!is_back) cell_corners[k] = CellCorner(p, q);
+        p -= origin;
+        q -= origin;
         vec3 centre = (p + q) / 3.0;
         for (uint half_index = 0; half_index < 2; ++half_index) {
             vec3 middle = 0.5 * (half_index == 0 ? p : q), sum = middle + centre;

@@ -1,9 +1,9 @@
 //! What moves, and what must not differ.
 
 use crate::common::TestContext;
-use crate::fixture::{Fixture, Solution, builtin_scene, solve};
+use crate::fixture::{Fixture, builtin_scene, solve};
 use glam::Vec3;
-use linklight::methods::implicit_visibility::{Frames, Settings};
+use linklight::methods::implicit_visibility::Settings;
 use linklight::scene::environment::Environment;
 use linklight::scene::pose::Pose;
 
@@ -72,49 +72,4 @@ fn sky_and_materials_change_without_new_links() {
     let other = Fixture::posed(&context, repainted, None, dawn, &pose);
     assert!(painted == solve(&context, &other.linked(&context, settings), &other.world, 2));
     assert!(white != relit && relit != painted);
-}
-
-/// What surrounds a dancing figure shimmers as bins see it or miss it: how much, by bins and frames.
-#[test]
-fn shimmer_around_a_dancer_falls_with_the_bins() {
-    let context = TestContext::new();
-    let scene = builtin_scene("dancer");
-    let sky = Environment::Constant(Vec3::ONE);
-    let times = [0.50, 0.52, 0.54];
-    let fixture = Fixture::posed(&context, scene.clone(), None, sky, &Pose::at(&scene, times[0]));
-    let shimmer_of = |settings: Settings| {
-        let mut method = fixture.linked(&context, settings);
-        let solutions: Vec<Solution> = times
-            .iter()
-            .map(|&time| {
-                let mut recorder = context.recorder("test").unwrap();
-                fixture.world.pose(&mut recorder, &Pose::at(&scene, time));
-                recorder.submit().unwrap();
-                method.link(&context, &fixture.stage()).unwrap();
-                solve(&context, &method, &fixture.world, 0)
-            })
-            .collect();
-        // Second differences: what is left when all that changes evenly is taken away. Still elements alone.
-        let mut sum = 0.0;
-        let mut count = 0;
-        let positions = context.download(&fixture.world.positions).unwrap();
-        for (element, position) in fixture.rest_positions.iter().enumerate() {
-            if (positions[element] - *position).length() > 1e-4 {
-                continue;
-            }
-            count += 1;
-            for k in 1..times.len() - 1 {
-                let at = |k: usize| solutions[k].direct[element].x;
-                sum += f64::from(at(k + 1) - 2.0 * at(k) + at(k - 1)).powi(2);
-            }
-        }
-        assert!(count > 100, "{count} still elements");
-        let shimmer = (sum / f64::from(count)).sqrt();
-        println!("N = {}, {:?}: shimmer {shimmer:.5} of {count} still elements", settings.bins, settings.frames);
-        shimmer
-    };
-    let coarse = shimmer_of(Settings { bins: 4, ..Settings::default() });
-    shimmer_of(Settings { bins: 4, frames: Frames::Surface, ..Settings::default() });
-    let fine = shimmer_of(Settings { bins: 10, ..Settings::default() });
-    assert!(fine > 0.0 && fine < 0.7 * coarse, "{fine} {coarse}");
 }

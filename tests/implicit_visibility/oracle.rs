@@ -9,23 +9,42 @@ use linklight::scene::environment::Environment;
 use linklight::scene::pose::Pose;
 use std::f64::consts::PI;
 
-/// Shares of the bins above the horizon that the oracle fills.
+/// So many leaves are held against the oracle.
+const SAMPLES: usize = 14;
+
+/// The bins above the horizon that the oracle fills.
 #[derive(Debug, Default)]
 struct Agreement {
     filled: usize,
-    /// The same leaf, or a node above it.
+    /// The same leaf on the same side, or a node above it.
     same: usize,
     /// Another node at the same distance, within a twentieth: a neighbour on the same surface.
     beside: usize,
     empty: usize,
 }
 
-fn expected(context: &TestContext, method: &ImplicitVisibility) -> Vec<Vec<(f64, u32)>> {
+impl Agreement {
+    fn share(&self) -> f64 {
+        (self.same + self.beside) as f64 / self.filled as f64
+    }
+}
+
+fn expected(context: &TestContext, fixture: &Fixture, method: &ImplicitVisibility) -> Vec<Vec<(f64, u32)>> {
     let trees = &method.trees().topology;
-    let surfels = context.download(&method.trees().surfels).unwrap();
+    let topology = &method.elements().topology;
     let receivers = context.download(&method.linking().receivers).unwrap();
-    let tree_of: Vec<u32> = (0..trees.leaf_count()).map(|leaf| trees.segment(leaf).tree).collect();
-    twins::all_pairs(&surfels, &receivers, &tree_of, method.settings().bins)
+    let mut leaf_of = vec![twins::EMPTY; topology.vertices.len()];
+    trees.leaf_elements.iter().zip(0..).for_each(|(&element, leaf)| leaf_of[element as usize] = leaf);
+    let of_back = |&back: &u32| leaf_of.get(back as usize).copied().unwrap_or(twins::EMPTY);
+    let backs: Vec<u32> = topology.back_elements.iter().map(of_back).collect();
+    let positions = context.download(&fixture.world.positions).unwrap();
+    let triangles = &fixture.geometry.triangles;
+    let cells = twins::Cells { positions: &positions, triangles, fronts: &leaf_of, backs: &backs };
+    receivers
+        .iter()
+        .step_by(receivers.len() / SAMPLES)
+        .map(|at| cells.nearest(at.origin, method.settings().bins))
+        .collect()
 }
 
 fn agreement(
@@ -36,56 +55,59 @@ fn agreement(
 ) -> Agreement {
     let method = fixture.linked(context, settings);
     if expected.is_empty() {
-        *expected = self::expected(context, &method);
+        *expected = self::expected(context, fixture, &method);
     }
     let trees = &method.trees().topology;
     let surfels = context.download(&method.trees().surfels).unwrap();
     let receivers = context.download(&method.linking().receivers).unwrap();
-    let vectors = bins::vectors(settings.bins);
     let mut found = Agreement::default();
-    for ((row, winners), receiver) in expected.iter().zip(winners(context, &method)).zip(&receivers) {
-        for (bin, &(distance, winner)) in row.iter().enumerate() {
-            if winner == twins::EMPTY || vectors[bin].dot(receiver.normal) <= 0.05 * vectors[bin].length() {
+    let rows = winners(context, &method);
+    let sampled = rows.iter().zip(&receivers).step_by(rows.len() / SAMPLES);
+    let directions = twins::directions(settings.bins);
+    for (row, (winners, receiver)) in expected.iter().zip(sampled) {
+        for ((&(distance, winner), &own), direction) in row.iter().zip(winners).zip(&directions) {
+            let direction = direction.as_vec3();
+            if winner == twins::EMPTY || direction.dot(receiver.normal) <= 0.02 {
                 continue;
             }
             found.filled += 1;
-            if winners[bin] == twins::EMPTY {
+            if own == twins::EMPTY {
                 found.empty += 1;
                 continue;
             }
-            let node = winners[bin] & !twins::BACK;
-            let s = &surfels[node as usize];
             // Where the bin's ray meets the winner's plane.
-            let direction = vectors[bin].normalize();
+            let s = &surfels[(own & !twins::BACK) as usize];
             let there = s.normal.dot(s.centre - receiver.origin) / s.normal.dot(direction);
-            let is_above = trees.leaves(node).contains(&(winner & !twins::BACK));
-            if is_above {
+            let is_same_side = (own ^ winner) & twins::BACK == 0;
+            if is_same_side && trees.leaves(own & !twins::BACK).contains(&(winner & !twins::BACK)) {
                 found.same += 1;
-            } else if (f64::from(there) / distance - 1.0).abs() < 0.05 {
+            } else if is_same_side && (f64::from(there) / distance - 1.0).abs() < 0.05 {
                 found.beside += 1;
             }
         }
     }
-    println!("{settings:?}\n{found:?}");
+    println!("{settings:?}\n{:.4}: {found:?}", found.share());
     found
 }
 
+/// In a box, and among small things: what all leaves together would find by brute force, each by its real surface.
 #[test]
-fn brute_force_finds_the_nearest_leaf_of_all_and_the_hierarchy_next_to_always() {
+fn brute_force_finds_what_rays_would_and_the_hierarchy_next_to_always() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(1.5));
-    let settings = Settings { bins: 8, fill_holes: false, ..Settings::default() };
-    let mut expected = Vec::new();
-    let brute = agreement(&context, &fixture, Settings { brute_force: true, ..settings }, &mut expected);
-    let share = |count: usize, of: &Agreement| count as f64 / of.filled as f64;
-    // The rest are ties of two surfels on one plane, and rims that rounding decides.
-    assert!(brute.filled > 10_000 && brute.empty * 1000 < brute.filled, "{brute:?}");
-    assert!(share(brute.same + brute.beside, &brute) > 0.999, "{brute:?}");
-    for refinement in [1.0, 2.0] {
-        let hierarchy = agreement(&context, &fixture, Settings { refinement, ..settings }, &mut expected);
-        // The rest stand at silhouettes: a node's place is off by part of a bin, and the bin goes to what is beside.
-        assert!(share(hierarchy.same + hierarchy.beside, &hierarchy) > 0.95, "{hierarchy:?}");
-        assert!(share(hierarchy.empty, &hierarchy) < 0.01, "{hierarchy:?}");
+    for (name, max_edge, least) in [("cornell-box", Some(0.4), [0.99, 0.998]), ("dancer", None, [0.95, 0.975])] {
+        let fixture = Fixture::new(&context, builtin_scene(name), max_edge);
+        let settings = Settings { bins: 8, fill_holes: false, ..Settings::default() };
+        let mut expected = Vec::new();
+        let brute = agreement(&context, &fixture, Settings { brute_force: true, ..settings }, &mut expected);
+        // The rest are rims that rounding decides.
+        assert!(brute.filled > 1500 && brute.share() > 0.998, "{name}: {brute:?}");
+        assert!(brute.empty * 1000 < brute.filled, "{name}: {brute:?}");
+        for (refinement, least) in [1.0, 0.25].into_iter().zip(least) {
+            let hierarchy = agreement(&context, &fixture, Settings { refinement, ..settings }, &mut expected);
+            // The rest stand at silhouettes: a node's place is off by part of a bin, and the bin goes to what is beside.
+            assert!(hierarchy.share() > least, "{name}: {hierarchy:?}");
+            assert!(hierarchy.empty * 100 < hierarchy.filled, "{name}: {hierarchy:?}");
+        }
     }
 }
 

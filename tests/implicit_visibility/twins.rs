@@ -1,7 +1,6 @@
 //! Plain, slow versions of what the method's passes compute.
 
 use glam::{DMat3, DVec3, Vec3};
-use linklight::gpu::shaders::types::{Receiver, Surfel};
 use linklight::methods::implicit_visibility::bins;
 
 /// What turns its back, as in a winner.
@@ -41,40 +40,51 @@ pub fn cell_moments(v: u32, positions: &[Vec3], triangles: &[[u32; 3]]) -> (f64,
     (area, mean, squares * (1.0 / area) - DMat3::from_cols(mean * mean.x, mean * mean.y, mean * mean.z))
 }
 
-/// Nearest leaf in each bin of each leaf over all pairs: (distance, winner), by rays through the bins' centres against
-/// the ellipses of all surfels, in double precision.
-pub fn all_pairs(surfels: &[Surfel], receivers: &[Receiver], trees: &[u32], n: u32) -> Vec<Vec<(f64, u32)>> {
-    let directions: Vec<DVec3> = (0..6 * n * n)
-        .map(|bin| {
-            let at = |cell: u32| (2.0 * f64::from(cell) + 1.0) / f64::from(n) - 1.0;
-            bins::face_direction(bin / (n * n), at(bin % n), at(bin / n % n)).normalize()
-        })
-        .collect();
-    let row = |(leaf, at): (usize, &Receiver)| {
-        let mut row = vec![(f64::INFINITY, EMPTY); directions.len()];
-        for (sender, s) in surfels[..receivers.len()].iter().enumerate() {
-            let offset = (s.centre - at.origin).as_dvec3();
-            let plane = s.normal.as_dvec3().dot(offset);
-            let is_beside = trees[leaf] == trees[sender]
-                && offset.length() < f64::from(surfels[leaf].radius + s.radius)
-                && plane > 0.0;
-            if sender == leaf || is_beside {
-                continue;
-            }
-            for (bin, direction) in directions.iter().enumerate() {
-                let t = plane / s.normal.as_dvec3().dot(*direction);
-                if !(t > 0.0 && t < row[bin].0) {
+/// Directions through the centres of all bins.
+pub fn directions(n: u32) -> Vec<DVec3> {
+    let at = move |cell: u32| (2.0 * f64::from(cell) + 1.0) / f64::from(n) - 1.0;
+    (0..6 * n * n)
+        .map(move |bin| bins::face_direction(bin / (n * n), at(bin % n), at(bin / n % n)).normalize())
+        .collect()
+}
+
+/// The triangles of a scene, and the leaf of each vertex's front and back.
+pub struct Cells<'a> {
+    pub positions: &'a [Vec3],
+    pub triangles: &'a [[u32; 3]],
+    pub fronts: &'a [u32],
+    /// [`EMPTY`] where the surface is one-sided.
+    pub backs: &'a [u32],
+}
+
+impl Cells<'_> {
+    /// What each direction meets first from `origin`: its distance, and the leaf with the largest barycentric coordinate
+    /// there, with [`BACK`] where it is met from behind. Over all triangles, in double precision.
+    pub fn nearest(&self, origin: Vec3, n: u32) -> Vec<(f64, u32)> {
+        let directions = directions(n);
+        let mut row: Vec<(f64, u32)> = vec![(f64::INFINITY, EMPTY); directions.len()];
+        for &triangle in self.triangles {
+            let [a, b, c] = triangle.map(|v| (self.positions[v as usize] - origin).as_dvec3());
+            let planes = [b.cross(c), c.cross(a), a.cross(b)];
+            let volume = a.dot(planes[0]);
+            for (nearest, direction) in row.iter_mut().zip(&directions) {
+                let w = planes.map(|plane| plane.dot(*direction) * volume.signum());
+                let t = volume.abs() / (w[0] + w[1] + w[2]);
+                if w.iter().any(|&w| w < 0.0) || !(t > 0.0 && t < nearest.0) {
                     continue;
                 }
-                let x = t * direction - offset;
-                if s.g1.as_dvec3().dot(x).powi(2) + s.g2.as_dvec3().dot(x).powi(2) <= 1.0 {
-                    row[bin] = (t, sender as u32 | if plane > 0.0 { BACK } else { 0 });
-                }
+                let corner = (0..3).max_by(|&i, &j| w[i].total_cmp(&w[j])).unwrap();
+                let vertex = triangle[corner] as usize;
+                let leaf = match (volume > 0.0, self.backs[vertex]) {
+                    (false, _) => self.fronts[vertex],
+                    (true, EMPTY) => self.fronts[vertex] | BACK,
+                    (true, back) => back,
+                };
+                *nearest = (t, leaf);
             }
         }
         row
-    };
-    receivers.iter().enumerate().map(row).collect()
+    }
 }
 
 /// Weight of each bin at a receiver along the world's axes: the integral of the cosine over it, sr, scaled to pi.

@@ -1,26 +1,25 @@
 //! From surfels to winners: links are made, refined and pushed down, window after window.
 
 use super::windows::{self, WindowPlan};
-use super::{Footprint, Frames, Settings, bins};
+use super::{Footprint, Settings, bins};
 use crate::gpu::shaders::methods::implicit_visibility as passes;
-use crate::gpu::shaders::types::{Receiver, WindowLevel};
+use crate::gpu::shaders::types::{LinkCounts, Receiver, ReceiverGroup, WindowLevel};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
-use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
 use crate::stages::quadtree::Quadtrees;
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use crate::stages::work::{Interrupted, Watch};
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
-/// Pairs of a step of the queue.
-const BATCH: u32 = 1 << 16;
+/// Groups of receivers whose links are made in one submission, between which the user may interrupt.
+const GROUPS_AT_ONCE: u32 = 1 << 10;
+/// Receivers of a group, at most, and threads of its workgroup.
+const GROUP: u32 = 16;
 
 /// Why the method cannot be prepared or its links cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum ImplicitError {
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    #[error(transparent)]
-    Queue(#[from] PairQueueError),
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     #[error(
@@ -30,17 +29,12 @@ pub enum ImplicitError {
     OutOfMemory { needed: u64, available: u64, elements: u64, bins: u32 },
 }
 
-/// What was counted while links were made.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct LinkCounts {
-    pub pairs_visited: u64,
-    pub pairs_linked: u64,
-}
-
 /// The leaves of a window, and the winner of each of their bins.
 pub struct Window {
     pub plan: WindowPlan,
     levels: Buffer<WindowLevel>,
+    /// Of all levels, leaves first.
+    groups: Buffer<ReceiverGroup>,
     /// `6 n n * leaf_count`, bin after bin: node, and in the highest bit that it turns its back; u32::MAX where empty.
     pub winners: Buffer<u32>,
 }
@@ -53,13 +47,13 @@ pub struct Linking {
     pub receivers: Buffer<Receiver>,
     pub windows: Vec<Window>,
     keys: Buffer<u64>,
-    queue: PairQueue,
+    /// One entry.
+    pub counts: Buffer<LinkCounts>,
 }
 
 /// What will be allocated, counted before.
 pub(super) struct Sizes {
     pub windows: Vec<WindowPlan>,
-    queue: PairQueuePlan,
     keys: usize,
     bytes: u64,
 }
@@ -70,15 +64,12 @@ impl Sizes {
         let memory = (u64::from(settings.link_memory) << 20).min(context.limits().storage_buffer_bytes);
         let max_rows = (memory / (8 * bins)).clamp(1, 1 << 30) as u32;
         let windows = windows::plan(trees, max_rows);
-        let seeds = windows.iter().map(|window| window.receivers.len() * trees.roots.len()).max().unwrap_or(0);
-        let levels = 2 * trees.levels.len() as u32;
-        let queue = PairQueuePlan { batch: BATCH, max_children: 4, levels, seeds: seeds as u32 };
         let rows = windows.iter().map(WindowPlan::row_count).max().unwrap_or(0);
         let keys = rows as usize * bins as usize;
         let leaves = u64::from(trees.leaf_count());
         let receiver_bytes = leaves * size_of::<Receiver>() as u64;
-        let bytes = 8 * keys as u64 + 4 * bins * leaves + queue.bytes_needed() + receiver_bytes;
-        Self { windows, queue, keys, bytes }
+        let bytes = 8 * keys as u64 + 4 * bins * leaves + receiver_bytes;
+        Self { windows, keys, bytes }
     }
 
     /// Bytes that [`Linking::new`] allocates.
@@ -100,6 +91,7 @@ impl Linking {
             let count = plan.leaves().len() * settings.bin_count() as usize;
             windows.push(Window {
                 levels: context.upload(&format!("implicit/window levels {index}"), &plan.levels)?,
+                groups: context.upload(&format!("implicit/receiver groups {index}"), &plan.groups.concat())?,
                 winners: context.buffer(&format!("implicit/winners {index}"), count)?,
                 plan,
             });
@@ -110,59 +102,80 @@ impl Linking {
             receivers: context.buffer("implicit/receivers", trees.topology.leaf_count() as usize)?,
             windows,
             keys: context.buffer("implicit/keys", sizes.keys)?,
-            queue: PairQueue::new(context, "implicit", sizes.queue)?,
+            counts: context.buffer("implicit/link counts", 1)?,
         })
     }
 
-    /// Makes all links anew for the trees' present surfels.                                   [Dong2007 4.2.2 to 4.2.4]
+    /// Makes all links anew for the trees' present surfels; says how many pairs were visited and how many links
+    /// proposed.                                                                           [Dong2007 4.2.2 to 4.2.4]
     pub(super) fn link(
         &self,
         context: &Context,
         trees: &Quadtrees,
         settings: &Settings,
         watch: &dyn Watch,
-    ) -> Result<LinkCounts, ImplicitError> {
-        let mut counts = LinkCounts::default();
-        let window_count = self.windows.len() as u64;
-        for (index, window) in self.windows.iter().enumerate() {
-            watch.step("links", index as u64, window_count)?;
-            let roots = &trees.topology.roots;
-            let pairs = window.plan.receivers.iter().flat_map(|&receiver| roots.iter().map(move |&s| (receiver, s)));
-            let seeds: Vec<UVec2> = pairs.map(|(receiver, sender)| UVec2::new(receiver, sender)).collect();
+    ) -> Result<(u64, u64), ImplicitError> {
+        let (mut visited, mut proposed) = (0, 0);
+        let rows: u64 = self.windows.iter().map(|window| u64::from(window.plan.row_count())).sum();
+        let mut done = 0;
+        for window in &self.windows {
             let mut recorder = context.recorder("implicit-visibility")?;
             recorder.fill(&self.keys, u32::MAX);
+            recorder.fill(&self.counts, 0);
             recorder.submit()?;
-            let pass = passes::Refine {
-                taken_pairs: &self.queue.taken,
-                counters: &self.queue.counters,
-                pair_stack: &self.queue.stack,
-                node_segments: &trees.node_segments,
-                segments: &trees.segments,
-                surfels: &trees.surfels,
-                moments: &trees.moments,
-                receivers: &self.receivers,
-                bin_solid_angles: &self.bin_solid_angles,
-                window_levels: &window.levels,
-                keys: &self.keys,
-                params: passes::RefineParams {
-                    n: settings.bins,
-                    refinement: if settings.brute_force { 0.0 } else { settings.refinement },
-                    is_single: u32::from(settings.footprint() == Footprint::Single),
-                    leaf_count: trees.topology.leaf_count(),
-                },
-            };
-            let counters = self.queue.refine(context, "implicit-visibility/create links", &seeds, |recorder| {
-                recorder.dispatch_indirect(&pass, &self.queue.groups, 0);
-            })?;
-            counts.pairs_visited += u64::from(counters.visited);
-            counts.pairs_linked += u64::from(counters.accepted);
-
+            let mut first_of_level = 0;
+            for (level, groups) in window.plan.groups.iter().enumerate() {
+                let group_total = groups.len() as u32;
+                for first in (0..group_total).step_by(GROUPS_AT_ONCE as usize) {
+                    watch.step("links", done, rows)?;
+                    let group_count = (group_total - first).min(GROUPS_AT_ONCE);
+                    let first_group = first_of_level + first;
+                    let params = passes::CreateLinksParams {
+                        level: level as u32,
+                        first_group,
+                        group_count,
+                        ..link_params(trees, settings)
+                    };
+                    let mut recorder = context.recorder("implicit-visibility")?;
+                    recorder.scope("create links", |recorder| {
+                        recorder.dispatch(&self.create_links(trees, window, params), GROUP * group_count);
+                    });
+                    recorder.submit()?;
+                    let made = &groups[first as usize..(first + group_count) as usize];
+                    done += made.iter().map(|group| u64::from(group.count)).sum::<u64>();
+                }
+                first_of_level += group_total;
+            }
             let mut recorder = context.recorder("implicit-visibility")?;
             recorder.scope("refine and push", |recorder| self.push_down(recorder, trees, settings, window));
             recorder.submit()?;
+            let counts = context.download(&self.counts)?[0];
+            visited += u64::from(counts.visited);
+            proposed += u64::from(counts.proposed);
         }
-        watch.step("links", window_count, window_count)?;
-        Ok(counts)
+        watch.step("links", rows, rows)?;
+        Ok((visited, proposed))
+    }
+
+    fn create_links<'a>(
+        &'a self,
+        trees: &'a Quadtrees,
+        window: &'a Window,
+        params: passes::CreateLinksParams,
+    ) -> passes::CreateLinks<'a> {
+        passes::CreateLinks {
+            walk: &trees.walk,
+            receiver_groups: &window.groups,
+            surfels: &trees.surfels,
+            moments: &trees.moments,
+            receivers: &self.receivers,
+            leaf_cells: &trees.leaf_cells,
+            cell_corners: &trees.cell_corners,
+            window_levels: &window.levels,
+            keys: &self.keys,
+            link_counts: &self.counts,
+            params,
+        }
     }
 
     fn push_down(&self, recorder: &mut Recorder<'_>, trees: &Quadtrees, settings: &Settings, window: &Window) {
@@ -187,7 +200,7 @@ impl Linking {
             params: passes::ResolveParams {
                 n: settings.bins,
                 fills_holes: u32::from(settings.fill_holes),
-                is_turned: u32::from(settings.frames != Frames::World || settings.spin != 0.0),
+                is_turned: u32::from(settings.is_turned()),
             },
         };
         recorder.dispatch(&pass, window.plan.leaves().len() * 6 * settings.bins as usize);
@@ -203,5 +216,20 @@ impl Linking {
             }
         }
         Ok(Vec::new())
+    }
+}
+
+/// What all dispatches of a frame have in common.
+fn link_params(trees: &Quadtrees, settings: &Settings) -> passes::CreateLinksParams {
+    passes::CreateLinksParams {
+        level: 0,
+        first_group: 0,
+        group_count: 0,
+        n: settings.bins,
+        refinement: if settings.brute_force { 0.0 } else { settings.refinement },
+        is_single: u32::from(settings.footprint() == Footprint::Single),
+        leaf_count: trees.topology.leaf_count(),
+        walk_count: trees.topology.node_count(),
+        is_turned: u32::from(settings.is_turned()),
     }
 }

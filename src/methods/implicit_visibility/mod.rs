@@ -18,8 +18,10 @@
 //! **Per frame with new links** ([`ImplicitVisibility::link`]): anything that moves or deforms. **Without:** lights,
 //! materials, the environment.
 //!
-//! Differs from [Dong2007]: surfels fill all the bins they cover, at their distance in each, so that no light leaks where
-//! leaves are larger than bins; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
+//! Differs from [Dong2007]: each receiver finds its links by a walk over the trees, which a queue of pairs would only
+//! scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
+//! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
+//! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
 //! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays (shared with the other
 //! methods). What it does not do: glossy transport between elements.
 //!
@@ -107,7 +109,7 @@ impl ImplicitVisibility {
         let ray_bytes = BATCH_RAYS * (size_of::<Ray>() + 4) * usize::from(light_count > 0);
         let needed = sizes.bytes()
             + Elements::bytes_needed(&topology)
-            + Quadtrees::bytes_needed(&tree_topology)
+            + Quadtrees::bytes_needed(&tree_topology, topology.incident.values.len())
             + (4 * count * light_words + ray_bytes) as u64;
         let (available, elements) = (context.available_bytes(), count as u64);
         if needed > available {
@@ -115,7 +117,7 @@ impl ImplicitVisibility {
         }
 
         let elements = Elements::new(context, topology, rest_positions, world, settings.ray_offset)?;
-        let trees = Quadtrees::new(context, tree_topology)?;
+        let trees = Quadtrees::new(context, tree_topology, elements.topology.incident.values.len())?;
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, geometry, rest_positions, &elements, choice, samples)?;
         let linking = Linking::new(context, &trees, &settings, sizes)?;
@@ -148,9 +150,8 @@ impl ImplicitVisibility {
         recorder.submit()?;
 
         // CreateHierarchicalLinks, RefineHierarchicalLinks, PushdownLinks
-        let counts = self.linking.link(context, &self.trees, &self.settings, stage.watch)?;
-        self.report.pairs_visited = counts.pairs_visited;
-        self.report.pairs_linked = counts.pairs_linked;
+        (self.report.pairs_visited, self.report.links_proposed) =
+            self.linking.link(context, &self.trees, &self.settings, stage.watch)?;
 
         let mut recorder = context.recorder("implicit-visibility")?;
         recorder.scope("see lights", |recorder| {
@@ -160,7 +161,9 @@ impl ImplicitVisibility {
             self.report.light_rays =
                 punctual::trace_visibility(recorder, &stage.tracer, world, &self.elements, rays, is_free, visibility);
         });
-        Ok(recorder.submit()?)
+        recorder.submit()?;
+        self.report.links_kept = context.download(&self.linking.counts)?[0].kept.into();
+        Ok(())
     }
 
     fn place_receivers(&self, recorder: &mut Recorder<'_>, world: &World) {
@@ -195,6 +198,7 @@ impl ImplicitVisibility {
                 leaf_elements: &self.trees.leaf_elements,
                 bin_vectors: &self.linking.bin_vectors,
                 outcomes: &self.state.outcomes,
+                link_counts: &self.linking.counts,
                 params: passes::CountBacksParams {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
@@ -341,7 +345,7 @@ impl ImplicitVisibility {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
                     n: self.settings.bins,
-                    is_turned: u32::from(self.settings.frames != Frames::World || self.settings.spin != 0.0),
+                    is_turned: u32::from(self.settings.is_turned()),
                 },
             };
             recorder.dispatch(&pass, leaves.len());

@@ -19,8 +19,10 @@ pub struct Report {
     pub windows: u32,
     /// Pairs of nodes looked at.
     pub pairs_visited: u64,
-    /// Of these, pairs proposed as links.
-    pub pairs_linked: u64,
+    /// Of these, links proposed to bins.
+    pub links_proposed: u64,
+    /// Bins of elements with a winner.
+    pub links_kept: u64,
     /// Bytes of all winners.
     pub winner_bytes: u64,
     /// Shadow rays to punctual lights.
@@ -31,13 +33,14 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "{} elements, {} charts, {} nodes, {} bins each; {} pairs visited, {} linked; winners {:.1} MiB",
+            "{} elements, {} charts, {} nodes, {} bins each; {} pairs visited, {} links proposed, {} kept; winners {:.1} MiB",
             self.elements,
             self.charts,
             self.nodes,
             self.bins,
             self.pairs_visited,
-            self.pairs_linked,
+            self.links_proposed,
+            self.links_kept,
             self.winner_bytes as f64 / (1 << 20) as f64
         )
     }

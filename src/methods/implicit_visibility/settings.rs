@@ -80,6 +80,11 @@ impl Settings {
         6 * self.bins * self.bins
     }
 
+    /// Whether leaves' bins are not along the world's axes.
+    pub(super) fn is_turned(&self) -> bool {
+        self.frames != Frames::World || self.spin != 0.0
+    }
+
     pub(super) fn footprint(&self) -> Footprint {
         if self.transport == Transport::Disc { Footprint::Single } else { self.footprint }
     }

@@ -4,20 +4,19 @@
 //! above them that receive. A tree too large for a window is cut: its upper nodes receive nothing, and links that they
 //! would have received are made further down. Senders are never cut.
 
-use crate::gpu::shaders::types::WindowLevel;
+use crate::gpu::shaders::types::{ReceiverGroup, WindowLevel};
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use std::ops::Range;
-
-/// Pairs that a window starts from, at most (unless a single receiver has more senders).
-const MAX_SEEDS: usize = 1 << 20;
 
 /// Which nodes receive in a window.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowPlan {
-    /// The nodes that pairs start from as receivers.
+    /// The nodes whose subtrees receive.
     pub receivers: Vec<u32>,
     /// One per level of the trees, leaves first, and an empty one above.
     pub levels: Vec<WindowLevel>,
+    /// Per level: the nodes in groups of neighbours.
+    pub groups: Vec<Vec<ReceiverGroup>>,
 }
 
 impl WindowPlan {
@@ -41,8 +40,7 @@ pub fn plan(trees: &QuadtreeTopology, max_rows: u32) -> Vec<WindowPlan> {
     let (mut rows, mut receivers): (u32, Vec<u32>) = (0, Vec::new());
     for node in cut {
         let own = subtree_rows(trees, node);
-        let seeds = (receivers.len() + 1) * trees.roots.len();
-        if !receivers.is_empty() && (rows + own > max_rows || seeds > MAX_SEEDS) {
+        if !receivers.is_empty() && rows + own > max_rows {
             windows.push(window(trees, std::mem::take(&mut receivers)));
             rows = 0;
         }
@@ -96,8 +94,44 @@ fn window(trees: &QuadtreeTopology, receivers: Vec<u32>) -> WindowPlan {
         row += level.count;
         level
     });
-    let levels = levels.collect();
-    WindowPlan { receivers, levels }
+    let levels: Vec<WindowLevel> = levels.collect();
+    let groups = (0..trees.levels.len()).map(|level| groups(trees, &levels, level)).collect();
+    WindowPlan { receivers, levels, groups }
+}
+
+/// The nodes of a level in groups of the same grandparent.
+fn groups(trees: &QuadtreeTopology, levels: &[WindowLevel], level: usize) -> Vec<ReceiverGroup> {
+    let WindowLevel { first, count, .. } = levels[level];
+    let up = |node: u32, steps: u32| (0..steps).fold(node, |node, _| trees.parent(node).unwrap_or(node));
+    let above = &levels[level + 1];
+    let is_above = |node: u32| (above.first..above.first + above.count).contains(&node);
+    let mut groups: Vec<ReceiverGroup> = Vec::new();
+    for node in first..first + count {
+        if let Some(last) = groups.last_mut()
+            && last.node == up(node, 2)
+        {
+            last.count += 1;
+            continue;
+        }
+        let parent = trees.parent(node).filter(|&parent| is_above(parent));
+        groups.push(ReceiverGroup {
+            first: node,
+            count: 1,
+            node: up(node, 2),
+            above_first: parent.unwrap_or(0),
+            above_count: u32::from(parent.is_some()),
+            above_node: parent.map_or(0, |parent| up(parent, 2)),
+        });
+    }
+    // The parents of a group are in one group, as a whole.
+    for group in groups.iter_mut().filter(|group| group.above_count > 0) {
+        let members = trees.segment(group.above_first);
+        let place = (group.above_first - members.first) / 16 * 16;
+        group.above_first = (members.first + place).max(above.first);
+        group.above_count =
+            (members.first + (place + 16).min(members.count)).min(above.first + above.count) - group.above_first;
+    }
+    groups
 }
 
 #[cfg(test)]
@@ -122,6 +156,20 @@ mod tests {
                 let mut held: Vec<u32> = window.levels.iter().flat_map(|l| l.first..l.first + l.count).collect();
                 held.sort_unstable();
                 assert_eq!(nodes, held);
+                // Groups hold the same nodes, each below its group's, and their parents' groups are groups.
+                let members = |group: &ReceiverGroup| group.first..group.first + group.count;
+                assert!(window.groups.iter().flatten().all(|group| group.count <= 16));
+                let mut grouped: Vec<u32> = window.groups.iter().flatten().flat_map(members).collect();
+                grouped.sort_unstable();
+                assert_eq!(held, grouped);
+                for (level, group) in window.groups.iter().enumerate().flat_map(|(l, g)| g.iter().map(move |g| (l, g)))
+                {
+                    let leaves = trees.leaves(group.node);
+                    assert!(members(group).all(|node| leaves.contains(&trees.leaves(node).start)));
+                    let above = (group.above_first, group.above_count, group.above_node);
+                    let is_group = |other: &ReceiverGroup| (other.first, other.count, other.node) == above;
+                    assert!(group.above_count == 0 || window.groups[level + 1].iter().any(is_group), "{group:?}");
+                }
             }
             assert_eq!(next, trees.leaf_count());
             assert_eq!(windows.len() == 1, max_rows >= trees.node_count());

@@ -10,7 +10,7 @@ pub mod topology;
 use super::elements::Elements;
 use super::world::World;
 use crate::gpu::shaders::quadtree as passes;
-use crate::gpu::shaders::types::{QuadtreeSegment, Surfel, SurfelMoments};
+use crate::gpu::shaders::types::{CellCorner, LeafCell, QuadtreeSegment, Surfel, SurfelMoments, WalkStep};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use glam::Vec3;
 use topology::QuadtreeTopology;
@@ -25,11 +25,18 @@ pub struct Quadtrees {
     pub surfels: Buffer<Surfel>,
     /// One per node.
     pub moments: Buffer<SurfelMoments>,
+    /// One per leaf.
+    pub leaf_cells: Buffer<LeafCell>,
+    /// One per entry of the elements' incident triangles.
+    pub cell_corners: Buffer<CellCorner>,
+    /// One per node.
+    pub walk: Buffer<WalkStep>,
 }
 
 impl Quadtrees {
     /// Uploads the topology; [`Self::pull_surfels`] places the nodes.
-    pub fn new(context: &Context, topology: QuadtreeTopology) -> Result<Self, GpuError> {
+    /// `corner_count` is the number of the elements' incident triangles.
+    pub fn new(context: &Context, topology: QuadtreeTopology, corner_count: usize) -> Result<Self, GpuError> {
         let count = topology.node_count() as usize;
         Ok(Self {
             leaf_elements: context.upload("quadtree/leaf elements", &topology.leaf_elements)?,
@@ -37,15 +44,19 @@ impl Quadtrees {
             segments: context.upload("quadtree/segments", &topology.segments)?,
             surfels: context.buffer("quadtree/surfels", count)?,
             moments: context.buffer("quadtree/moments", count)?,
+            leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
+            cell_corners: context.buffer("quadtree/cell corners", corner_count)?,
+            walk: context.upload("quadtree/walk", &topology.walk())?,
             topology,
         })
     }
 
     /// Bytes of the tables of [`Self::new`].
-    pub fn bytes_needed(topology: &QuadtreeTopology) -> u64 {
-        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + size_of::<u32>();
+    pub fn bytes_needed(topology: &QuadtreeTopology, corner_count: usize) -> u64 {
+        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + size_of::<WalkStep>() + size_of::<u32>();
         u64::from(topology.node_count()) * node as u64
-            + u64::from(topology.leaf_count()) * 4
+            + u64::from(topology.leaf_count()) * (size_of::<LeafCell>() + size_of::<u32>()) as u64
+            + (corner_count * size_of::<CellCorner>()) as u64
             + (topology.segments.len() * size_of::<QuadtreeSegment>()) as u64
     }
 
@@ -60,8 +71,11 @@ impl Quadtrees {
             triangles: &world.triangles,
             incident_offsets: &elements.incident_offsets,
             incident_triangles: &elements.incident_triangles,
+            back_elements: &elements.back_elements,
             surfels: &self.surfels,
             moments: &self.moments,
+            leaf_cells: &self.leaf_cells,
+            cell_corners: &self.cell_corners,
             params: passes::LeafSurfelsParams { leaf_count },
         };
         recorder.dispatch(&pass, leaf_count);

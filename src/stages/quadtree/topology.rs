@@ -4,7 +4,7 @@
 //! next, and children 4 i to 4 i + 3. Here the levels of all charts stand together: first the leaves of all charts,
 //! chart after chart, then all nodes above leaves, and so on. A *segment* is one chart's share of one level.
 
-use crate::gpu::shaders::types::QuadtreeSegment;
+use crate::gpu::shaders::types::{QuadtreeSegment, WalkStep};
 use crate::scene::charts::{Charts, NO_CHART};
 use crate::stages::elements::BACK_SIDE;
 use glam::Vec2;
@@ -111,6 +111,29 @@ impl QuadtreeTopology {
         &self.segments[self.node_segments[node as usize] as usize]
     }
 
+    /// All nodes, each before its children, and where to go on without them.
+    pub fn walk(&self) -> Vec<WalkStep> {
+        let mut steps = Vec::with_capacity(self.node_count() as usize);
+        let mut stack: Vec<u32> = self.roots.iter().rev().copied().collect();
+        while let Some(node) = stack.pop() {
+            let below = self.subtree_count(node);
+            steps.push(WalkStep { node, skip: steps.len() as u32 + below });
+            stack.extend(self.children(node).rev());
+        }
+        steps
+    }
+
+    /// Nodes below and including a node.
+    fn subtree_count(&self, node: u32) -> u32 {
+        let mut count = 0;
+        let mut level = node..node + 1;
+        while !level.is_empty() {
+            count += level.len() as u32;
+            level = self.children(level.start).start..self.children(level.end - 1).end;
+        }
+        count
+    }
+
     /// Leaves below (or equal to) a node.
     pub fn leaves(&self, node: u32) -> Range<u32> {
         let segment = self.segment(node);
@@ -163,6 +186,17 @@ mod tests {
             }
             assert_eq!(trees.parent(node).is_none(), trees.roots.contains(&node));
         }
+        // The walk meets all nodes, and what it skips below one are all that descend from it.
+        let walk = trees.walk();
+        let mut met: Vec<u32> = walk.iter().map(|step| step.node).collect();
+        for (k, step) in walk.iter().enumerate() {
+            let descends =
+                |&node: &u32| std::iter::successors(Some(node), |&n| trees.parent(n)).any(|n| n == step.node);
+            assert!(met[k..step.skip as usize].iter().all(descends));
+            assert!(met.get(step.skip as usize).is_none_or(|node| !descends(node)));
+        }
+        met.sort_unstable();
+        assert!(met.into_iter().eq(0..trees.node_count()));
         assert_eq!(is_child.iter().filter(|is_child| !**is_child).count(), trees.roots.len());
         let leaves: Vec<u32> = trees.roots.iter().map(|&root| trees.leaves(root).len() as u32).collect();
         assert_eq!(leaves, sizes.iter().copied().filter(|&size| size > 0).collect::<Vec<_>>());
