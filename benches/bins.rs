@@ -102,45 +102,59 @@ const PAPER: [(u32, [f64; 4]); 3] =
 
 fn stages(_: &mut Criterion) {
     let context = Context::new(Options::default()).unwrap();
-    for refinement in [1.0, 2.0] {
-        for (bins, paper) in PAPER {
-            let (frame, method) =
-                frames(&context, "cornell-box", 3_400, Settings { bins, refinement, ..Settings::default() });
-            let share = |ms: f64| format!("{ms:.1} ms ({:.0} %)", 100.0 * ms / frame.total());
-            let report = method.report();
-            println!(
-                "{} elements, N = {bins}, refinement {refinement}: update {}, create {}, refine and push {}, illumination {}, \
-                 total {:.1} ms; paper {paper:?} ms; {:.2} M pairs/s, {:.2} M links proposed/s",
-                report.elements,
-                share(frame.update),
-                share(frame.create),
-                share(frame.refine_and_push),
-                share(frame.illumination),
-                frame.total(),
-                report.pairs_visited as f64 / frame.create * 1e-3,
-                report.links_proposed as f64 / frame.create * 1e-3,
-            );
-        }
+    for (bins, paper) in PAPER {
+        let (frame, method) = frames(&context, "cornell-box", 3_400, Settings { bins, ..Settings::default() });
+        let share = |ms: f64| format!("{ms:.1} ms ({:.0} %)", 100.0 * ms / frame.total());
+        let report = method.report();
+        let rate = |count: u64| count as f64 / frame.create * 1e-3;
+        println!(
+            "{} elements, N = {bins}: update {}, create {}, refine and push {}, illumination {}, total {:.1} ms; paper \
+             {paper:?}, {:.0} ms; {:.2} M pairs/s, {:.2} M links proposed/s, {:.2} M kept/s",
+            report.elements,
+            share(frame.update),
+            share(frame.create),
+            share(frame.refine_and_push),
+            share(frame.illumination),
+            frame.total(),
+            paper.iter().sum::<f64>(),
+            rate(report.pairs_visited),
+            rate(report.links_proposed),
+            rate(report.links_kept),
+        );
     }
 }
 
+/// Whole frames from 3,000 to 100,000 elements: the exponent of N log N that fits, and memory.
 fn growth(_: &mut Criterion) {
-    let context = Context::new(Options::default()).unwrap();
-    let mut first = None;
-    for elements in [3_000, 8_000, 20_000, 50_000] {
-        let settings = Settings { bins: 8, refinement: 2.0, ..Settings::default() };
-        let (frame, method) = frames(&context, "cornell-box", elements, settings);
-        let count = f64::from(method.report().elements);
-        let per = frame.total() / (count * count.log2());
-        let first = *first.get_or_insert(per);
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for elements in [3_000, 10_000, 30_000, 100_000] {
+        let context = Context::new(Options::default()).unwrap();
+        let (frame, method) = frames(&context, "cornell-box", elements, Settings { bins: 8, ..Settings::default() });
+        let report = method.report();
+        let count = f64::from(report.elements);
+        let memory = context.memory_by_owner();
+        let mebibytes = |name: &str| {
+            let own = memory.iter().filter(|(owner, _)| owner.contains(name));
+            own.map(|(_, use_of)| use_of.peak_bytes).sum::<u64>() as f64 / f64::from(1 << 20)
+        };
         println!(
-            "{count} elements, N = 8: {:.0} ms, {} pairs, {:.2} of the first per N log N; {:.0} MiB of winners",
+            "{count} elements, N = 8: {:.0} ms, {:.1} M pairs, {:.1} M links; at most {:.0} MiB, of these winners {:.0} ({:.2} \
+             bytes per element and bin), keys {:.0}",
             frame.total(),
-            method.report().pairs_visited,
-            per / first,
-            method.report().winner_bytes as f64 / (1 << 20) as f64
+            report.pairs_visited as f64 * 1e-6,
+            report.links_proposed as f64 * 1e-6,
+            mebibytes(""),
+            mebibytes("implicit/winners"),
+            report.winner_bytes as f64 / (count * f64::from(report.bins)),
+            mebibytes("implicit/keys"),
         );
+        points.push(((count * count.log2()).ln(), frame.total().ln()));
     }
+    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
+    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
+    let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>();
+    println!("frame time grows with (N log N) to the power {slope:.2}");
 }
 
 fn gather(criterion: &mut Criterion) {

@@ -260,11 +260,11 @@ impl Method {
                 method.solve(context, &explicit_stage(stage, watch), request.bounces)?;
                 let size = UVec2::new(request.width, request.height);
                 let colors = method.false_colors(context, world, view, size)?;
-                let indirect_irradiance = method.look(context, world, view)?;
+                let (direct_irradiance, indirect_irradiance) = method.look(context, world, view)?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
                     let light = VertexLight {
-                        direct_irradiance: method.direct_irradiance(),
+                        direct_irradiance,
                         indirect_irradiance,
                         back_elements: &method.elements().back_elements,
                         colors: colors.as_ref(),

@@ -26,9 +26,10 @@ pub trait OnElements {
     /// Reflected at least once.
     fn indirect_irradiance(&self) -> &Buffer<Vec3>;
 
-    /// Indirect light as the eye of `view` sees it, where surfaces reflect unevenly; by default as it is.
-    fn look(&self, _: &Context, _: &World, _: &View) -> Result<&Buffer<Vec3>, AppError> {
-        Ok(self.indirect_irradiance())
+    /// Direct (without punctual lights) and indirect light as the eye of `view` sees it, where surfaces reflect unevenly;
+    /// by default as it is.
+    fn look(&self, _: &Context, _: &World, _: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
+        Ok((self.direct_irradiance(), self.indirect_irradiance()))
     }
 
     /// The colours of the debug view that the settings ask for, if they do, for a picture of `size` pixels.
@@ -94,6 +95,13 @@ impl OnElements for ImplicitVisibility {
         Self::indirect_irradiance(self)
     }
 
+    fn look(&self, context: &Context, world: &World, view: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
+        let mut recorder = context.recorder("frame")?;
+        recorder.scope("look", |recorder| Self::look(self, recorder, world, view));
+        recorder.submit()?;
+        Ok(self.shown_irradiance())
+    }
+
     fn false_colors(
         &self,
         context: &Context,
@@ -142,11 +150,11 @@ impl OnElements for Antiradiance {
         Self::indirect_irradiance(self)
     }
 
-    fn look(&self, context: &Context, world: &World, view: &View) -> Result<&Buffer<Vec3>, AppError> {
+    fn look(&self, context: &Context, world: &World, view: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
         let mut recorder = context.recorder("frame")?;
         recorder.scope("look", |recorder| Self::look(self, recorder, world, view));
         recorder.submit()?;
-        Ok(self.shown_irradiance())
+        Ok((self.direct_irradiance(), self.shown_irradiance()))
     }
 
     fn false_colors(

@@ -4,8 +4,11 @@
 mod common;
 mod dynamics;
 mod fixture;
+mod glossy;
 mod oracle;
+mod passes;
 mod physics;
+mod sky;
 mod sweep;
 mod trees;
 mod twins;

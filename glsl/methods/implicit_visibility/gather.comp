@@ -5,8 +5,8 @@
 
 // One thread per leaf of a window: irradiance from the winners of its bins.                        [Dong2007 4.3, Eq. 5]
 // reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr: the integral of
-// the unit direction over the bin), surfels, node_radiosity [node_count] (W/m2)   writes irradiance[element_count] (W/m2)
-// shared none.  Differs from [Dong2007]: see IS_PAPER.
+// the unit direction over the bin), surfels, node_radiosity [node_count] (W/m2), glossy_of_node, specular (W m^-2 sr^-1), light_bins (bits)
+// writes irradiance[element_count] (W/m2)   shared none.  Differs from [Dong2007]: see IS_PAPER.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Receivers { Receiver receivers[]; };
@@ -14,16 +14,22 @@ layout(set = 0, binding = 2, scalar) readonly buffer LeafElements { uint leaf_el
 layout(set = 0, binding = 3, scalar) readonly buffer BinVectors { vec3 bin_vectors[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Surfels { Surfel surfels[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer NodeRadiosity { vec3 node_radiosity[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer GlossyOfNode { uint glossy_of_node[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Specular { vec3 specular[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer LightBins { uint light_bins[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_leaf;
     uint leaf_count;    // of the window
     uint bin_count;
     uint is_bounded;    // coverage: a sender fills no more of its bin than its own solid angle
+    uint table_side;    // of glossy nodes' tables; 0: all send evenly
 } params;
 // 1: the paper's Eq. 5, a point to a disc. 0: the sender covers its bin, so its weight is the bin's own form factor,
 // scaled so that all bins above the horizon together weigh pi.
 layout(constant_id = 0) const uint IS_PAPER = 0;
+// 1: light links alone.
+layout(constant_id = 1) const uint OF_EMITTERS = 0;
 
 const float PI = 3.14159265358979;
 
@@ -39,6 +45,7 @@ void main()
         float weight = dot(bin_vectors[bin], normal);
         if (weight <= 0.0) continue;
         total += weight;
+        if (OF_EMITTERS != 0 && (light_bins[bin / 32 * params.leaf_count + local] >> bin % 32 & 1) == 0) continue;
         uint winner = winners[bin * params.leaf_count + local];
         if (winner >= BACK_SEEN) continue;
         if (IS_PAPER != 0 || params.is_bounded != 0) {
@@ -49,7 +56,11 @@ void main()
             if (IS_PAPER != 0) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
             else weight *= min(1.0, solid_angle / length(bin_vectors[bin]));
         }
-        sum += weight * node_radiosity[winner];
+        vec3 sent = node_radiosity[winner];
+        if (params.table_side != 0 && glossy_of_node[winner] != EMPTY_BIN)
+            sent += PI * specular[glossy_of_node[winner] * 6 * params.table_side * params.table_side
+                                  + bin_of(at.origin - surfels[winner].centre, params.table_side)];
+        sum += weight * sent;
     }
     irradiance[leaf_elements[params.first_leaf + local]] = sum / (IS_PAPER != 0 || total == 0.0 ? PI : total);
 }

@@ -27,6 +27,11 @@ pub enum ImplicitError {
          available; lower --elements or bins"
     )]
     OutOfMemory { needed: u64, available: u64, elements: u64, bins: u32 },
+    #[error(
+        "implicit visibility needs {needed} bytes for the directions of {nodes} glossy nodes, {available} are available; \
+         lower glossy_bins or raise glossy"
+    )]
+    GlossOutOfMemory { needed: u64, available: u64, nodes: usize },
 }
 
 /// The leaves of a window, and the winner of each of their bins.
@@ -37,6 +42,8 @@ pub struct Window {
     groups: Buffer<ReceiverGroup>,
     /// `6 n n * leaf_count`, bin after bin: node, and in the highest bit that it turns its back; u32::MAX where empty.
     pub winners: Buffer<u32>,
+    /// `ceil(6 n n / 32) * leaf_count`, bits: the bins whose winners emit, each leaf's light links.
+    pub light_bins: Buffer<u32>,
 }
 
 /// Bins, queue and windows.
@@ -46,7 +53,8 @@ pub struct Linking {
     pub bin_vectors: Buffer<Vec3>,
     pub receivers: Buffer<Receiver>,
     pub windows: Vec<Window>,
-    keys: Buffer<u64>,
+    /// Of the window linked last: of each node and bin, distance bits above, back and node below.
+    pub keys: Buffer<u64>,
     /// One entry.
     pub counts: Buffer<LinkCounts>,
 }
@@ -68,7 +76,7 @@ impl Sizes {
         let keys = rows as usize * bins as usize;
         let leaves = u64::from(trees.leaf_count());
         let receiver_bytes = leaves * size_of::<Receiver>() as u64;
-        let bytes = 8 * keys as u64 + 4 * bins * leaves + receiver_bytes;
+        let bytes = 8 * keys as u64 + 4 * (bins + bins.div_ceil(32)) * leaves + receiver_bytes;
         Self { windows, keys, bytes }
     }
 
@@ -93,6 +101,10 @@ impl Linking {
                 levels: context.upload(&format!("implicit/window levels {index}"), &plan.levels)?,
                 groups: context.upload(&format!("implicit/receiver groups {index}"), &plan.groups.concat())?,
                 winners: context.buffer(&format!("implicit/winners {index}"), count)?,
+                light_bins: context.buffer(
+                    &format!("implicit/light bins {index}"),
+                    plan.leaves().len() * settings.bin_count().div_ceil(32) as usize,
+                )?,
                 plan,
             });
         }

@@ -23,11 +23,13 @@
 //! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
 //! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
 //! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays (shared with the other
-//! methods). What it does not do: glossy transport between elements.
+//! methods); glossy elements send tables of directions along the links (`gloss`), which the paper leaves to the eye.
+//! What it does not do: mirrors sharper than a bin, and holes of alpha masks (leaves are opaque).
 //!
 //! [Dong2007]: crate::methods::PAPERS
 
 pub mod bins;
+mod gloss;
 mod linking;
 mod report;
 mod settings;
@@ -53,6 +55,7 @@ use crate::stages::quadtree::Quadtrees;
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use crate::stages::world::{World, WorldEnvironment};
 use glam::Vec3;
+use gloss::Gloss;
 use linking::Sizes;
 
 /// The method on one scene.
@@ -63,6 +66,7 @@ pub struct ImplicitVisibility {
     trees: Quadtrees,
     emitters: Emitters,
     linking: Linking,
+    gloss: Gloss,
     state: State,
     /// At the density of the bins.
     environment: WorldEnvironment,
@@ -82,6 +86,9 @@ struct State {
     direct: Buffer<Vec3>,
     indirect: Buffer<Vec3>,
     smoothed: Buffer<Vec3>,
+    /// As the eye sees them; empty where nothing is glossy.
+    shown_direct: Buffer<Vec3>,
+    shown_indirect: Buffer<Vec3>,
     /// Thousandths of backs seen.
     outcomes: Buffer<u32>,
     /// Per light, then per element; 0..1.
@@ -89,6 +96,15 @@ struct State {
     /// Shadow rays of a batch, and their answers.
     rays: Buffer<Ray>,
     is_free: Buffer<u32>,
+}
+
+/// What is gathered along links.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sent {
+    /// Along light links alone, evenly.
+    Emitted,
+    /// Along all, glossy nodes by their tables.
+    Reflected,
 }
 
 /// Shadow rays of a batch.
@@ -105,7 +121,7 @@ impl ImplicitVisibility {
 
         let sizes = Sizes::new(context, &tree_topology, &settings);
         let (count, light_count) = (topology.vertices.len(), world.light_count as usize);
-        let light_words = 6 * 3 + 1 + light_count + settings.emitter_samples.div_ceil(32) as usize + 1;
+        let light_words = 8 * 3 + 1 + light_count + settings.emitter_samples.div_ceil(32) as usize + 1;
         let ray_bytes = BATCH_RAYS * (size_of::<Ray>() + 4) * usize::from(light_count > 0);
         let needed = sizes.bytes()
             + Elements::bytes_needed(&topology)
@@ -121,15 +137,26 @@ impl ImplicitVisibility {
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, geometry, rest_positions, &elements, choice, samples)?;
         let linking = Linking::new(context, &trees, &settings, sizes)?;
-        let state = State::new(context, &elements, &trees, world.light_count)?;
+        let glossy = Gloss::find(context, &trees, &elements, world, settings.glossy)?;
+        let (needed, available) =
+            (Gloss::bytes_needed(&glossy.0, &trees, settings.glossy_bins), context.available_bytes());
+        if needed > available {
+            return Err(ImplicitError::GlossOutOfMemory { needed, available, nodes: glossy.0.len() });
+        }
+        let gloss = Gloss::new(context, &trees, glossy, settings.glossy_bins)?;
+        let state = State::new(context, &elements, &trees, world.light_count, !gloss.is_empty())?;
         let n = settings.bins;
         Ok(Self {
-            report: Report::new(&settings, &charts, &elements, &trees, &linking),
+            report: Report {
+                glossy: gloss.leaf_count(),
+                ..Report::new(&settings, &charts, &elements, &trees, &linking)
+            },
             charts,
             elements,
             trees,
             emitters,
             linking,
+            gloss,
             state,
             environment: WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?,
             bin_radiance: context.upload("implicit/bin radiance", &bins::radiance(environment, n))?,
@@ -143,7 +170,7 @@ impl ImplicitVisibility {
         let mut recorder = context.recorder("implicit-visibility")?;
         recorder.scope("update elements", |recorder| {
             self.elements.place(recorder, world);
-            self.elements.update_materials(recorder, world);
+            self.update_materials(recorder, world);
             self.trees.pull_surfels(recorder, &self.elements, world); // UpdateElements
             self.place_receivers(recorder, world);
         });
@@ -155,7 +182,7 @@ impl ImplicitVisibility {
 
         let mut recorder = context.recorder("implicit-visibility")?;
         recorder.scope("see lights", |recorder| {
-            self.count_backs(recorder);
+            self.survey(recorder);
             self.see_emitters(recorder, world);
             let State { rays, is_free, visibility, .. } = &self.state;
             self.report.light_rays =
@@ -188,21 +215,29 @@ impl ImplicitVisibility {
         recorder.dispatch(&pass, leaf_count);
     }
 
-    fn count_backs(&self, recorder: &mut Recorder<'_>) {
+    /// Counts, and the lists of light links.
+    fn survey(&self, recorder: &mut Recorder<'_>) {
         recorder.fill(&self.state.outcomes, 0);
+        let has_emitters = self.emitters.plan.linked_parts > 0;
+        if has_emitters {
+            self.send_emission(recorder);
+        }
         for window in &self.linking.windows {
             let leaves = window.plan.leaves();
-            let pass = passes::CountBacks {
+            let pass = passes::Survey {
                 winners: &window.winners,
                 receivers: &self.linking.receivers,
                 leaf_elements: &self.trees.leaf_elements,
                 bin_vectors: &self.linking.bin_vectors,
                 outcomes: &self.state.outcomes,
                 link_counts: &self.linking.counts,
-                params: passes::CountBacksParams {
+                node_radiosity: &self.state.node_radiosity,
+                light_bins: &window.light_bins,
+                params: passes::SurveyParams {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
                     bin_count: self.settings.bin_count(),
+                    has_emitters: u32::from(has_emitters),
                 },
             };
             recorder.dispatch(&pass, leaves.len());
@@ -247,21 +282,28 @@ impl ImplicitVisibility {
     }
 
     /// Takes over the world's present materials; links stay. Emission may change as long as the same parts emit in
-    /// about the same proportion.
+    /// about the same proportion; for others, link anew.
     pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
         self.elements.update_materials(recorder, world);
+        self.gloss.update_materials(recorder, &self.elements, world);
     }
 
     /// The light of direct illumination and `bounces` more.                                     [Dong2007 4.3]
     pub fn solve(&self, recorder: &mut Recorder<'_>, world: &World, bounces: u32) {
         let (elements, s) = (&self.elements, &self.state);
-        recorder.scope("direct", |recorder| self.direct_light(recorder, world));
+        recorder.scope("direct", |recorder| {
+            self.direct_light(recorder, world);
+            self.reflect_direct(recorder, world);
+        });
         elements.reflect(recorder, &s.irradiance, &s.radiosity);
 
         recorder.fill(&s.indirect, 0);
         for bounce in 1..=bounces {
             recorder.scope(format_args!("bounce {bounce}"), |recorder| {
-                self.gather(recorder); // PullupEnergy, ComputeIlluminateLeafNodes: Eq. 5
+                self.trees.pull_radiosity(recorder, &s.radiosity, &s.node_radiosity); // PullupEnergy
+                self.gloss.send(recorder, &self.trees, &s.node_radiosity);
+                self.gather(recorder, Sent::Reflected); // ComputeIlluminateLeafNodes: Eq. 5
+                self.reflect_bounce(recorder);
                 elements.add(recorder, &s.irradiance, &s.indirect);
                 elements.reflect(recorder, &s.irradiance, &s.radiosity);
             });
@@ -279,14 +321,8 @@ impl ImplicitVisibility {
 
         self.emitters.irradiance(recorder, world, elements, &s.direct);
         if self.emitters.plan.linked_parts > 0 {
-            let pass = EmittedRadiosity {
-                emission: &elements.emission,
-                is_sampled: &self.emitters.is_sampled,
-                radiosity: &s.radiosity,
-                params: EmittedRadiosityParams { element_count: elements.count },
-            };
-            recorder.dispatch(&pass, elements.count);
-            self.gather(recorder);
+            self.send_emission(recorder);
+            self.gather(recorder, Sent::Emitted);
             elements.add(recorder, &s.irradiance, &s.direct);
         }
         if self.environment.info.is_black == 0 {
@@ -299,10 +335,22 @@ impl ImplicitVisibility {
         elements.add(recorder, &s.punctual, &s.irradiance);
     }
 
-    /// `irradiance` of all elements from their winners' `radiosity`.
-    fn gather(&self, recorder: &mut Recorder<'_>) {
-        let s = &self.state;
+    /// Emission that comes along links, to all nodes.
+    fn send_emission(&self, recorder: &mut Recorder<'_>) {
+        let (elements, s) = (&self.elements, &self.state);
+        let pass = EmittedRadiosity {
+            emission: &elements.emission,
+            is_sampled: &self.emitters.is_sampled,
+            radiosity: &s.radiosity,
+            params: EmittedRadiosityParams { element_count: elements.count },
+        };
+        recorder.dispatch(&pass, elements.count);
         self.trees.pull_radiosity(recorder, &s.radiosity, &s.node_radiosity);
+    }
+
+    /// `irradiance` of all elements from their winners.
+    fn gather(&self, recorder: &mut Recorder<'_>, sent: Sent) {
+        let s = &self.state;
         recorder.fill(&s.irradiance, 0);
         for window in &self.linking.windows {
             let leaves = window.plan.leaves();
@@ -313,13 +361,20 @@ impl ImplicitVisibility {
                 bin_vectors: &self.linking.bin_vectors,
                 surfels: &self.trees.surfels,
                 node_radiosity: &s.node_radiosity,
+                glossy_of_node: &self.gloss.glossy_of_node,
+                specular: &self.gloss.specular,
                 irradiance: &s.irradiance,
-                constants: passes::GatherConstants { is_paper: u32::from(self.settings.transport == Transport::Disc) },
+                light_bins: &window.light_bins,
+                constants: passes::GatherConstants {
+                    is_paper: u32::from(self.settings.transport == Transport::Disc),
+                    of_emitters: u32::from(sent == Sent::Emitted),
+                },
                 params: passes::GatherParams {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
                     bin_count: self.settings.bin_count(),
                     is_bounded: u32::from(self.settings.footprint() == Footprint::Single),
+                    table_side: if sent == Sent::Reflected && !self.gloss.is_empty() { self.gloss.side } else { 0 },
                 },
             };
             recorder.dispatch(&pass, leaves.len());
@@ -402,6 +457,11 @@ impl ImplicitVisibility {
         &self.trees
     }
 
+    /// Points on sampled emitters, and who sees them.
+    pub fn emitters(&self) -> &Emitters {
+        &self.emitters
+    }
+
     pub fn linking(&self) -> &Linking {
         &self.linking
     }
@@ -413,8 +473,15 @@ impl ImplicitVisibility {
 }
 
 impl State {
-    fn new(context: &Context, elements: &Elements, trees: &Quadtrees, light_count: u32) -> Result<Self, GpuError> {
+    fn new(
+        context: &Context,
+        elements: &Elements,
+        trees: &Quadtrees,
+        light_count: u32,
+        is_glossy: bool,
+    ) -> Result<Self, GpuError> {
         let count = elements.count as usize;
+        let glossy_count = if is_glossy { count } else { 0 };
         // A single element's shadow rays to one light fit in any case.
         let rays = if light_count > 0 { BATCH_RAYS } else { 0 };
         Ok(Self {
@@ -425,6 +492,8 @@ impl State {
             direct: context.buffer("implicit/direct", count)?,
             indirect: context.buffer("implicit/indirect", count)?,
             smoothed: context.buffer("implicit/smoothed", count)?,
+            shown_direct: context.buffer("implicit/shown direct", glossy_count)?,
+            shown_indirect: context.buffer("implicit/shown indirect", glossy_count)?,
             outcomes: context.buffer("implicit/outcomes", count)?,
             visibility: context.buffer("implicit/visibility", count * light_count as usize)?,
             rays: context.buffer("implicit/shadow rays", rays)?,

@@ -23,6 +23,8 @@ pub struct Report {
     pub links_proposed: u64,
     /// Bins of elements with a winner.
     pub links_kept: u64,
+    /// Elements that send their specular lobe.
+    pub glossy: u32,
     /// Bytes of all winners.
     pub winner_bytes: u64,
     /// Shadow rays to punctual lights.

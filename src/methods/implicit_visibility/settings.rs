@@ -57,6 +57,10 @@ crate::settings! {
         emitters: EmitterChoice = EmitterChoice::Auto, paper "along links";
         /// Points on sampled emitters, together; each is tested against the bins of every element.
         emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
+        /// Surfaces that reflect at least so much at normal incidence are glossy: they send their lobe along; 2 for none.
+        glossy: f32 = 0.1, range 0.0..=2.0, paper "all";
+        /// Directions along each side of a face of the cube in which glossy elements and nodes send.
+        glossy_bins: u32 = 4, range 1..=16, unit "bins", paper "none on the GPU";
         /// Average indirect light over the one-ring.
         smoothing: bool = true, paper "off";
         /// Neighbours take part in smoothing where normals differ by less than this.

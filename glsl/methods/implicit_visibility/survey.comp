@@ -3,9 +3,11 @@
 #include "lib/bins.glsl"
 
 // One thread per leaf of a window: how much of what it sees turns its back, in thousandths of the cosine-weighted
-// hemisphere. An element that sees mostly backs stands inside something.
-// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr)
-// writes outcomes[element_count]   updates link_counts   shared none
+// hemisphere (an element that sees mostly backs stands inside something), how many links it kept, and the list of its
+// light links: the bins whose winners emit.                                                        [Dong2007 4.4]
+// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr), node_radiosity: emitted, [node_count]
+// writes outcomes[element_count], light_bins[ceil(6 n n / 32) * leaf_count of the window] (bits)   updates link_counts
+// shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Receivers { Receiver receivers[]; };
@@ -13,7 +15,9 @@ layout(set = 0, binding = 2, scalar) readonly buffer LeafElements { uint leaf_el
 layout(set = 0, binding = 3, scalar) readonly buffer BinVectors { vec3 bin_vectors[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Outcomes { uint outcomes[]; };
 layout(set = 0, binding = 5, scalar) buffer Counts { LinkCounts link_counts[]; };
-layout(push_constant, scalar) uniform Params { uint first_leaf; uint leaf_count; uint bin_count; } params;
+layout(set = 0, binding = 6, scalar) readonly buffer NodeRadiosity { vec3 node_radiosity[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer LightBins { uint light_bins[]; };
+layout(push_constant, scalar) uniform Params { uint first_leaf; uint leaf_count; uint bin_count; uint has_emitters; } params;
 
 void main()
 {
@@ -22,14 +26,20 @@ void main()
     Receiver at = receivers[params.first_leaf + local];
     vec3 normal = turn_back(at.frame, at.normal);
     float backs = 0.0, total = 0.0;
-    uint kept = 0;
+    uint kept = 0, lights = 0;
     for (uint bin = 0; bin < params.bin_count; ++bin) {
         float weight = max(dot(bin_vectors[bin], normal), 0.0);
         uint winner = winners[bin * params.leaf_count + local];
         total += weight;
-        if (winner == EMPTY_BIN) continue;
-        ++kept;
-        if ((winner & BACK_SEEN) != 0) backs += weight;
+        if (winner != EMPTY_BIN && weight > 0.0) {
+            ++kept;
+            if ((winner & BACK_SEEN) != 0) backs += weight;
+            else if (params.has_emitters != 0 && node_radiosity[winner] != vec3(0.0)) lights |= 1u << bin % 32;
+        }
+        if (bin % 32 == 31 || bin + 1 == params.bin_count) {
+            light_bins[bin / 32 * params.leaf_count + local] = lights;
+            lights = 0;
+        }
     }
     atomicAdd(link_counts[0].kept, kept);
     outcomes[leaf_elements[params.first_leaf + local]] = uint(1000.0 * backs / max(total, 1e-20));

@@ -1,0 +1,51 @@
+#version 460
+#extension GL_EXT_nonuniform_qualifier : require
+#include "lib/prelude.glsl"
+#include "lib/leaf_gloss.glsl"
+#include "lib/material.glsl"
+
+// One thread per vertex: its specular lobe, averaged over the triangles around it.
+// reads triangles, triangle_materials, incident_offsets[vertex_count + 1], incident_triangles, positions, attributes, materials
+// writes lobes[vertex_count]   shared none
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer TriangleMaterials { uint triangle_materials[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer IncidentOffsets { uint incident_offsets[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer IncidentTriangles { uint incident_triangles[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Materials { Material materials[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Lobes { LeafGloss lobes[]; };
+layout(set = 1, binding = 0) uniform sampler2D textures[];
+layout(push_constant, scalar) uniform Params { uint vertex_count; } params;
+
+// A middling level: a cell sees many texels.
+vec4 sample_texture(uint index, vec2 uv)
+{
+    float texels = 0.02 * float(textureSize(textures[nonuniformEXT(index)], 0).x);
+    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+}
+
+void main()
+{
+    uint vertex = linear_index();
+    if (vertex >= params.vertex_count) return;
+    LeafGloss mean = LeafGloss(vec3(0.0), 0.0, 0.0);
+    float area_sum = 0.0;
+    for (uint k = incident_offsets[vertex]; k < incident_offsets[vertex + 1]; ++k) {
+        uint triangle = incident_triangles[k];
+        uvec3 v = triangles[triangle];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        float area = length(cross(b - a, c - a));
+        vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
+        VertexAttributes at = interpolated(attributes[v.x], attributes[v.y], attributes[v.z], w);
+        Surface s = surface_of(materials[triangle_materials[triangle]], at, vec3(0.0, 0.0, 1.0), vec4(1.0, 0.0, 0.0, 1.0), false);
+        if (!s.reflects) continue;
+        mean.f0 += area * s.f0;
+        mean.f90 += area * s.f90;
+        mean.alpha += area * s.alpha;
+        area_sum += area;
+    }
+    float inverse = area_sum > 0.0 ? 1.0 / area_sum : 0.0;
+    lobes[vertex] = LeafGloss(mean.f0 * inverse, mean.f90 * inverse, mean.alpha * inverse);
+}
