@@ -96,9 +96,10 @@ fn a_step_agrees_with_its_twin() {
         let before = entries(&context, &tables.exitant);
         let transfers = method.transfers().download(&context).unwrap();
         let means = context.download(&tables.means).unwrap();
+        let peaks = context.download(&tables.peaks).unwrap();
 
         let mut recorder = context.recorder("test").unwrap();
-        let step = LocalStep { reflects: true, has_environment: false, sets_floor: false };
+        let step = LocalStep { reflects: true, ..LocalStep::default() };
         tables.step(&mut recorder, method.transfers(), hierarchy, bins, method.elements(), step);
         recorder.submit().unwrap();
 
@@ -117,7 +118,7 @@ fn a_step_agrees_with_its_twin() {
                 &incident[row.clone()],
                 source,
                 albedo,
-                [0, 1].map(|side| -undershoot * means[2 * index + side]),
+                |side, bin| -undershoot * peaks[index * m + bin].max(1.0) * means[2 * index + side],
             );
             irradiance.extend(twin.irradiance);
             radiosity.extend(twin.radiosity);

@@ -3,37 +3,38 @@
 use crate::common::TestContext;
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{prepare, relative_rmse, settings, solve};
-use linklight::methods::antiradiance::{AntiradianceError, Scheme, Settings, growth_rate};
-use linklight::stages::work::Unwatched;
+use linklight::methods::antiradiance::{Scheme, Settings, growth_rate};
 
 #[test]
 fn both_schemes_agree_after_many_steps() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
-    // Without a floor: where one cuts, it lies elsewhere in each scheme.
-    let base = Settings { undershoot: 1e9, refinement: 3.0, ..settings(128) };
-    let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
-    let asymmetric = Settings { scheme: Scheme::Asymmetric, depth: 40, tolerance: 1e-7, ..base };
-    let light = |settings| {
-        let mut method = prepare(&context, &fixture, settings);
-        let indirect = solve(&context, &mut method, &fixture, 40).indirect;
-        (indirect, method.residuals().to_vec())
-    };
-    let (one, residuals) = light(symmetric);
-    let (other, _) = light(asymmetric);
-    let difference = relative_rmse(&one, &other);
-    println!("the schemes differ by {difference:.2e} after many steps");
-    assert!(difference < 1e-4, "{difference}");
-    // 40 bounces are not all, but what is missing is far less than the comparison allows; few are not enough.
-    let mut few = prepare(&context, &fixture, Settings { iterations: 4, ..symmetric });
-    assert!(relative_rmse(&solve(&context, &mut few, &fixture, 40).indirect, &other) > 1e-3);
-    let last = residuals.last().unwrap();
-    assert!(last.relative() < 1e-5, "{last:?}");
-    assert!(growth_rate(&residuals[..20]).unwrap() < 1.0);
+    for undershoot in [0.0, 0.5, 1e9] {
+        let base = Settings { undershoot, refinement: 3.0, ..settings(128) };
+        let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
+        let asymmetric = Settings { scheme: Scheme::Asymmetric, depth: 40, tolerance: 1e-7, ..base };
+        let light = |settings| {
+            let mut method = prepare(&context, &fixture, settings);
+            let indirect = solve(&context, &mut method, &fixture, 40).indirect;
+            (indirect, method.residuals().to_vec())
+        };
+        let (one, residuals) = light(symmetric);
+        let (other, _) = light(asymmetric);
+        let difference = relative_rmse(&one, &other);
+        println!("undershoot {undershoot}: the schemes differ by {difference:.2e} after many steps");
+        assert!(difference < 1e-4, "{difference}");
+        let last = residuals.last().unwrap();
+        assert!(last.relative() < 1e-5, "{last:?}");
+        assert!(growth_rate(&residuals[..20]).unwrap() < 1.0);
+        // Steps of half the length end in the same place; a few steps do not.
+        let (damped, _) = light(Settings { damping: 0.5, iterations: 200, ..symmetric });
+        assert!(relative_rmse(&damped, &other) < 1e-4, "{}", relative_rmse(&damped, &other));
+        let (few, _) = light(Settings { iterations: 4, ..symmetric });
+        assert!(relative_rmse(&few, &other) > 1e-3);
+    }
 }
 
 /// 300 steps on the office, whose shelves have dozens of surfaces one behind the other: antiradiance settles, and stays.
-/// The symmetric scheme does not settle there, and says so.
 #[test]
 fn the_office_settles_over_300_steps() {
     let context = TestContext::new();
@@ -52,14 +53,13 @@ fn the_office_settles_over_300_steps() {
     let largest = residuals.iter().map(|r| r.total).fold(0.0, f64::max);
     assert!(largest < 3.0 * residuals[0].total, "{largest}");
 
-    let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 300, ..base };
-    let refused = prepare(&context, &fixture, symmetric).solve(&context, &fixture.world, 3, &Unwatched);
-    match refused {
-        Err(AntiradianceError::Growth { steps, rate, .. }) => {
-            println!("symmetric: grows by {rate:.2} a step, told after {steps}")
-        }
-        other => panic!("{other:?}"),
-    }
+    // The symmetric scheme too.
+    let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
+    let mut method = prepare(&context, &fixture, symmetric);
+    solve(&context, &mut method, &fixture, 3);
+    let residuals: Vec<_> = method.residuals().iter().filter(|r| r.bounce > 0).map(|r| r.relative()).collect();
+    println!("symmetric, damped by {}: {:.1e} at first, {:.1e} at last", method.damping(), residuals[0], residuals[99]);
+    assert!(residuals[99] < 2e-3, "{residuals:?}");
 }
 
 /// The f16 tables' error, as the settings say.

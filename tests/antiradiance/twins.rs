@@ -168,7 +168,7 @@ pub struct Local {
     pub exitant: Vec<DVec3>,
 }
 
-/// `incident`: the leaf's row. `albedo`, `source` and `floors`: front and back.
+/// `incident`: the leaf's row. `albedo` and `source`: front and back. `lowest`: by side and bin.
 pub fn local(
     leaf: &HierarchyLeaf,
     norm: f32,
@@ -176,11 +176,11 @@ pub fn local(
     incident: &[DVec3],
     source: [Vec3; 2],
     albedo: [Vec3; 2],
-    floors: [Vec3; 2],
+    lowest: impl Fn(usize, usize) -> Vec3,
 ) -> Local {
     let held = |w: Vec3| f64::from(discrete_cosine(leaf.normal.dot(w), norm, bins.count()));
     let side = |bin: usize| usize::from(leaf.normal.dot(bins.directions[bin]) > 0.0);
-    let arriving = |bin: usize| incident[bin].max(floors[side(bin)].as_dvec3());
+    let arriving = |bin: usize| incident[bin].max(lowest(side(bin), bin).as_dvec3());
     let solid_angle = 4.0 * std::f64::consts::PI / f64::from(bins.count());
     let mut irradiance = [DVec3::ZERO; 2];
     for (bin, &w) in bins.directions.iter().enumerate() {

@@ -2,13 +2,14 @@
 #define GLOSS
 // Specular reflection of a leaf towards a direction, from its incident bins.
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
-// means, has params.undershoot, and defines
+// means, peaks, has params.undershoot, and defines
 //     vec3 beside(uint bin)       radiance that arrives beside what the table holds
 #include "lib/brdf.glsl"
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
 #include "lib/specular_albedo.glsl"
+#include "methods/antiradiance/floor.glsl"
 #include "methods/antiradiance/table.glsl"
 
 vec3 beside(uint bin);
@@ -37,7 +38,6 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
     vec3 normal = side * own.normal;
     Surface s = glossy_surface(gloss[leaf], normal);
     uint parent = nodes[own.node].parent, row = own.node * BIN_COUNT;
-    vec3 lowest = -params.undershoot * means[2 * leaf + (side > 0.0 ? 0 : 1)];
 
     vec3 sum = vec3(0.0), weights = vec3(0.0);
     for (uint bin = 0; bin < BIN_COUNT; ++bin) {
@@ -47,7 +47,7 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
         vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
         vec3 arriving = LOAD_ENTRY(incident, row + bin);
         if (parent != NONE) arriving += LOAD_ENTRY(incident, parent * BIN_COUNT + bin);
-        sum += weight * max(arriving + beside(bin), lowest);
+        sum += weight * max(arriving + beside(bin), lowest_in(leaf, side > 0.0 ? 0 : 1, bin, params.undershoot));
         weights += weight;
     }
     vec3 mean = sum / max(weights, vec3(1e-20));

@@ -5,7 +5,7 @@
 #include "lib/leaf_gloss.glsl"
 
 // One thread per (glossy leaf, bin): radiance that its specular lobe sends along the bin.  [Dachsbacher2007 4.2 local pass, Eq. 18]
-// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, incident (pushed down to the
+// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, peaks, incident (pushed down to the
 // parents of leaves), environment[BIN_COUNT], base[glossy_count * BIN_COUNT] (what is sent in any case)   writes specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -21,6 +21,7 @@ layout(set = 0, binding = 7, scalar) readonly buffer Incident { uint64_t inciden
 layout(set = 0, binding = 8, scalar) writeonly buffer Specular { vec3 specular[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Base { vec3 base[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer Environment { vec3 environment[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer Peaks { float peaks[]; };
 layout(push_constant, scalar) uniform Params {
     uint glossy_count;
     float undershoot;

@@ -7,7 +7,8 @@
 
 // One thread per glossy leaf: the irradiance that, reflected evenly as the display does, gives what its specular lobe sends
 // to the eye besides its diffuse light.
-// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, incident, positions, albedo,
+// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, peaks, incident, positions,
+// albedo,
 // irradiance[element_count] (W/m2)   updates shown[element_count] (W/m2; of glossy leaves)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -24,6 +25,7 @@ layout(set = 0, binding = 8, scalar) readonly buffer Positions { vec3 positions[
 layout(set = 0, binding = 9, scalar) readonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer Peaks { float peaks[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0.
 layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; float undershoot; } params;
 

@@ -74,6 +74,7 @@ impl Gloss {
         hierarchy: &Hierarchy,
         bins: &DeviceBins,
         has_environment: bool,
+        bounces: f32,
     ) {
         let pass = passes::ReflectGlossy {
             glossy_leaves: &self.leaves,
@@ -83,6 +84,7 @@ impl Gloss {
             cosine_norms: &tables.cosine_norms,
             bin_directions: &bins.directions,
             means: &tables.means,
+            peaks: &tables.peaks,
             incident: &tables.incident,
             base: &self.base,
             environment: &tables.environment,
@@ -93,7 +95,7 @@ impl Gloss {
             },
             params: passes::ReflectGlossyParams {
                 glossy_count: self.count,
-                undershoot: tables.undershoot,
+                undershoot: bounces * tables.undershoot,
                 add_environment: u32::from(has_environment),
             },
         };
@@ -147,6 +149,7 @@ impl Antiradiance {
             cosine_norms: &tables.cosine_norms,
             bin_directions: &self.bins.directions,
             means: &tables.means,
+            peaks: &tables.peaks,
             incident: &tables.incident,
             positions: &world.positions,
             albedo: &self.elements.albedo,
@@ -156,7 +159,7 @@ impl Antiradiance {
             params: passes::ToEyeParams {
                 eye: eye.to_array(),
                 glossy_count: gloss.count,
-                undershoot: tables.undershoot,
+                undershoot: self.bounced * tables.undershoot,
             },
         };
         recorder.dispatch(&pass, gloss.count);

@@ -83,7 +83,8 @@ pub enum AntiradianceError {
     OutOfMemory { what: &'static str, nodes: u64, bins: u32, half: bool, needed: u64, available: u64 },
     #[error(
         "antiradiance grows: after {steps} steps of the {scheme} scheme changes are multiplied by about {rate:.2} each \
-         step (spectral radius above 1); lower undershoot, or set scheme=asymmetric, spread=cone, or fewer bins"
+         step (spectral radius above 1){}; lower undershoot, or set scheme=asymmetric, spread=cone, or fewer bins",
+        if *.scheme == "symmetric" { ", though damped" } else { "" }
     )]
     Growth { steps: u32, rate: f64, scheme: &'static str },
 }
@@ -100,6 +101,12 @@ pub struct Antiradiance {
     tables: Tables,
     state: State,
     residuals: Vec<Residual>,
+    /// Reflected light so far, of the sources' light.
+    bounced: f32,
+    /// Power of the sources' light, W.
+    source_power: f64,
+    /// Of the last symmetric iteration: share of its steps.
+    damping: f32,
     report: Report,
 }
 
@@ -170,6 +177,9 @@ impl Antiradiance {
             report: Report::new(&settings, &elements, &emitters, &hierarchy, &links, &transfers),
             state: State::new(context, &elements, stage.world.light_count)?,
             residuals: Vec::new(),
+            bounced: 1.0,
+            source_power: 0.0,
+            damping: settings.damping,
             settings,
             elements,
             emitters,
@@ -347,6 +357,11 @@ impl Antiradiance {
     /// Of the last solve, step by step.
     pub fn residuals(&self) -> &[Residual] {
         &self.residuals
+    }
+
+    /// Share of its steps that the last symmetric iteration took.
+    pub fn damping(&self) -> f32 {
+        self.damping
     }
 
     /// What was counted when the links were last made.

@@ -7,9 +7,13 @@ use crate::stages::work::Watch;
 use serde::Serialize;
 
 /// Change of the exitant light, of the most there was, beyond which an iteration is said to grow.
-const GROWTH_LIMIT: f64 = 1e3;
+const GROWTH_LIMIT: f64 = 1e4;
 /// Steps over which a growth rate is estimated.
 const GROWTH_STEPS: usize = 4;
+/// Share of a step below which the symmetric scheme gives up.
+const LEAST_DAMPING: f32 = 1.0 / 16.0;
+/// Bounds what [`LocalStep::bounced`] grows to.
+const MOST_BOUNCED: f64 = 1e6;
 
 /// One step of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -58,11 +62,12 @@ impl Antiradiance {
         });
         recorder.submit()?;
         watch.step("antiradiance, direct light", 0, 1)?;
-        self.settle(context, 0, has_environment, None)?;
+        self.bounced = 1.0;
+        self.settle(context, 0, has_environment)?;
         let mut recorder = context.recorder("antiradiance")?;
         recorder.copy(&self.tables.irradiance, &self.tables.linked);
         let gloss = &self.tables.gloss;
-        gloss.reflect(&mut recorder, &self.tables, &self.hierarchy, &self.bins, has_environment);
+        gloss.reflect(&mut recorder, &self.tables, &self.hierarchy, &self.bins, has_environment, 1.0);
         recorder.copy(&gloss.specular, &gloss.base);
         Ok(recorder.submit()?)
     }
@@ -80,54 +85,83 @@ impl Antiradiance {
             recorder.fill(&self.tables.irradiance, 0);
             return Ok(recorder.submit()?);
         }
-        self.tables.start(&mut recorder, &self.hierarchy, &self.bins, &self.elements, false);
         recorder.submit()?;
         match self.settings.scheme {
-            Scheme::Symmetric => {
-                for iteration in 1..=self.settings.iterations {
-                    watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
-                    self.step_once(
-                        context,
-                        iteration,
-                        LocalStep { reflects: true, has_environment: false, sets_floor: true },
-                    )?;
-                }
-            }
+            Scheme::Symmetric => self.iterate(context, watch),
             Scheme::Asymmetric => {
+                self.start(context)?;
                 for bounce in 1..=bounces {
                     watch.step("antiradiance", u64::from(bounce) - 1, bounces.into())?;
+                    self.settle(context, bounce, false)?;
                     // The last of the steps that settle antiradiance is also what the next bounce reflects.
-                    let reflects = (bounce < bounces).then_some(true);
-                    self.settle(context, bounce, false, reflects)?;
+                    if bounce < bounces {
+                        self.reflect(context)?;
+                    }
                 }
+                Ok(())
+            }
+        }
+    }
+
+    /// The sources' light alone.
+    fn start(&mut self, context: &Context) -> Result<(), GpuError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        self.tables.start(&mut recorder, &self.hierarchy, &self.bins, &self.elements, false);
+        recorder.submit()?;
+        self.bounced = 1.0;
+        self.source_power = self.sum_residuals(context)?[2];
+        Ok(())
+    }
+
+    /// Light and antiradiance together; where that grows, anew with shorter steps.         [Dachsbacher2007 2.2]
+    /// Differs from [Dachsbacher2007]: damped where needed, which brings every iteration to rest whose eigenvalues have
+    /// real parts below one; plain steps need magnitudes below one.
+    fn iterate(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
+        let before = self.residuals.len();
+        self.damping = self.settings.damping;
+        loop {
+            self.start(context)?;
+            let outcome = (1..=self.settings.iterations).try_for_each(|iteration| {
+                watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
+                let sets_floor = iteration == 1;
+                let (bounced, damping) = (self.bounced, self.damping);
+                let step = LocalStep { reflects: true, sets_floor, bounced, damping, ..LocalStep::default() };
+                self.step_once(context, iteration, step).map(|_| ())
+            });
+            match outcome {
+                Err(AntiradianceError::Growth { steps, rate, .. }) if self.damping > LEAST_DAMPING => {
+                    self.damping *= 0.5;
+                    let damping = self.damping;
+                    tracing::info!("antiradiance grows by {rate:.2} a step after {steps}: damped by {damping}");
+                    self.residuals.truncate(before);
+                }
+                outcome => return outcome,
+            }
+        }
+    }
+
+    /// Moves antiradiance on until it changes no more, light being what it is.            [Dachsbacher2007 Eq. 14]
+    fn settle(&mut self, context: &Context, bounce: u32, has_environment: bool) -> Result<(), AntiradianceError> {
+        for step in 0..self.settings.depth {
+            let sets_floor = bounce <= 1 && step == 0;
+            let step = LocalStep { has_environment, sets_floor, bounced: self.bounced, ..LocalStep::default() };
+            let residual = self.step_once(context, bounce, step)?;
+            if residual.relative() < f64::from(self.settings.tolerance) {
+                break;
             }
         }
         Ok(())
     }
 
-    /// Moves antiradiance on until it changes no more, light being what it is; then, if asked, reflects.   [Dachsbacher2007 Eq. 14]
-    fn settle(
-        &mut self,
-        context: &Context,
-        bounce: u32,
-        has_environment: bool,
-        reflects: Option<bool>,
-    ) -> Result<(), AntiradianceError> {
-        for step in 0..self.settings.depth {
-            let sets_floor = bounce <= 1 && step == 0;
-            let residual =
-                self.step_once(context, bounce, LocalStep { reflects: false, has_environment, sets_floor })?;
-            if residual.relative() < f64::from(self.settings.tolerance) {
-                break;
-            }
-        }
-        if reflects == Some(true) {
-            let mut recorder = context.recorder("antiradiance")?;
-            recorder.scope("reflect", |recorder| {
-                self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements);
-            });
-            recorder.submit()?;
-        }
+    /// What arrived last, reflected.                                                      [Dachsbacher2007 Eq. 13]
+    fn reflect(&mut self, context: &Context) -> Result<(), AntiradianceError> {
+        let mut recorder = context.recorder("antiradiance")?;
+        recorder.scope("reflect", |recorder| {
+            self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements, self.bounced);
+        });
+        recorder.submit()?;
+        let power = self.sum_residuals(context)?[2];
+        self.count_bounces(power);
         Ok(())
     }
 
@@ -138,23 +172,30 @@ impl Antiradiance {
             self.tables.step(recorder, &self.transfers, &self.hierarchy, &self.bins, &self.elements, step);
         });
         recorder.submit()?;
-        let residual = self.measure(context, bounce, step.reflects)?;
-        tracing::debug!(
-            "step {}, bounce {bounce}: exitant light {:.4} W, changed by {:.4} W",
-            residual.step,
-            residual.total,
-            residual.change
-        );
+        let [change, total, power] = self.sum_residuals(context)?;
+        let steps = self.residuals.last().map_or(0, |last| last.step) + 1;
+        let residual = Residual { step: steps, bounce, reflects: step.reflects, change, total };
+        if step.reflects {
+            self.count_bounces(power);
+        }
+        tracing::debug!("step {steps}, bounce {bounce}: exitant light {total:.4} W, changed by {change:.4} W");
         self.residuals.push(residual);
         self.watch()?;
         Ok(residual)
     }
 
-    fn measure(&self, context: &Context, bounce: u32, reflects: bool) -> Result<Residual, GpuError> {
+    /// Change of the exitant light, its sum, and what of it is reflected and emitted, W.
+    fn sum_residuals(&self, context: &Context) -> Result<[f64; 3], GpuError> {
         let leaves = context.download(&self.tables.residuals)?;
-        let sum = |part: fn(&glam::Vec2) -> f32| leaves.iter().map(|leaf| f64::from(part(leaf))).sum::<f64>();
-        let step = self.residuals.last().map_or(0, |last| last.step) + 1;
-        Ok(Residual { step, bounce, reflects, change: sum(|leaf| leaf.x), total: sum(|leaf| leaf.y) })
+        Ok(leaves.iter().fold([0.0; 3], |sum, leaf| {
+            [sum[0] + f64::from(leaf.x), sum[1] + f64::from(leaf.y), sum[2] + f64::from(leaf.z)]
+        }))
+    }
+
+    fn count_bounces(&mut self, power: f64) {
+        if self.source_power > 0.0 && power.is_finite() {
+            self.bounced = (power / self.source_power).clamp(1.0, MOST_BOUNCED) as f32;
+        }
     }
 
     /// Refuses an iteration that grows.

@@ -37,6 +37,8 @@ crate::settings! {
         scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
         /// Steps of the symmetric scheme.
         iterations: u32 = 8, range 1..=1000, unit "steps", paper "4 (8 for the finest pictures)";
+        /// Share of each step that the symmetric scheme takes; it halves this, down to 1/16, where the light grows.
+        damping: f32 = 1.0, range 0.0625..=1.0, paper "1";
         /// Steps for antiradiance to settle, per bounce, at most: surfaces one behind the other that light crosses.
         depth: u32 = 8, range 1..=1000, unit "steps", paper "the scene's depth complexity";
         /// Antiradiance has settled where a step changes less than this share of the light.
@@ -45,8 +47,8 @@ crate::settings! {
         spread: Spread = Spread::Cone, paper "gaussian";
         /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
         refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
-        /// How far below zero the light of a bin may fall, of the mean light its side received unoccluded: keeps the
-        /// iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
+        /// How far below zero the light of a bin may fall, of what the bin, and its side on average, received unoccluded:
+        /// keeps the iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
         /// never cuts.
         undershoot: f32 = 0.5, range 0.0..=1e9, paper "no limit";
         /// Which surfaces take away light that meets their backs.

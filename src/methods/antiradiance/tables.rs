@@ -32,27 +32,39 @@ pub struct Tables {
     /// Two per leaf from here on, front and back, W/m2. Radiosity without transport.
     pub source: Buffer<Vec3>,
     pub radiosity: Buffer<Vec3>,
-    /// The largest mean radiance that arrived in a step that sets the floor, W m^-2 sr^-1.
+    /// Mean radiance that arrived before anything was taken away, W m^-2 sr^-1.
     pub means: Buffer<Vec3>,
+    /// Per leaf and bin: what arrived so in the bin, of the mean of its side.
+    pub peaks: Buffer<f32>,
     /// What arrived last.
     pub irradiance: Buffer<Vec3>,
     /// Direct light of linked emitters and of the environment.
     pub linked: Buffer<Vec3>,
     /// The leaves with specular lobes, and what those send.
     pub gloss: Gloss,
-    /// Per leaf, W: change of the exitant light in the last step, and its sum.
-    pub residuals: Buffer<Vec2>,
+    /// Per leaf, W: change of the exitant light in the last step, its sum, and what of it is reflected and emitted.
+    pub residuals: Buffer<Vec3>,
 }
 
 /// What a step does beside moving antiradiance on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocalStep {
     /// Light is reflected anew, else what was reflected before stays.
     pub reflects: bool,
     /// The environment shines on every leaf.
     pub has_environment: bool,
-    /// The mean radiance that arrives now counts for how far below zero a bin may fall.
+    /// What arrives now, uncut, sets how far below zero a bin may fall from now on.
     pub sets_floor: bool,
+    /// Reflected light of all bounces so far, of the sources': the floor grows with it.
+    pub bounced: f32,
+    /// Share of the new exitant light, the rest stays what it was: less than 1 damps the iteration.
+    pub damping: f32,
+}
+
+impl Default for LocalStep {
+    fn default() -> Self {
+        Self { reflects: false, has_environment: false, sets_floor: false, bounced: 1.0, damping: 1.0 }
+    }
 }
 
 impl Tables {
@@ -93,6 +105,7 @@ impl Tables {
             means: context.buffer("antiradiance/means", sides)?,
             irradiance: context.buffer("antiradiance/irradiance", sides)?,
             linked: context.buffer("antiradiance/linked irradiance", sides)?,
+            peaks: context.buffer("antiradiance/peaks", leaves * bin_count as usize)?,
             residuals: context.buffer("antiradiance/residuals", leaves)?,
         })
     }
@@ -121,13 +134,14 @@ impl Tables {
         recorder.fill(&self.incident, 0);
         recorder.fill(&self.exitant, 0);
         recorder.fill(&self.means, 0);
+        recorder.fill(&self.peaks, 0);
         recorder.copy(&self.gloss.base, &self.gloss.specular);
         self.local(
             recorder,
             hierarchy,
             bins,
             elements,
-            LocalStep { reflects: false, has_environment, sets_floor: true },
+            LocalStep { has_environment, sets_floor: true, ..LocalStep::default() },
         );
     }
 
@@ -149,14 +163,15 @@ impl Tables {
     }
 
     /// Reflects what arrived last; antiradiance stays what it is.
-    pub fn reflect(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, elements: &Elements) {
-        self.local(
-            recorder,
-            hierarchy,
-            bins,
-            elements,
-            LocalStep { reflects: true, has_environment: false, sets_floor: true },
-        );
+    pub fn reflect(
+        &self,
+        recorder: &mut Recorder<'_>,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        elements: &Elements,
+        bounced: f32,
+    ) {
+        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: true, bounced, ..LocalStep::default() });
     }
 
     fn push(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
@@ -184,7 +199,7 @@ impl Tables {
         step: LocalStep,
     ) {
         if step.reflects {
-            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false));
+            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
         }
         let leaf_count = hierarchy.leaf_count();
         let pass = passes::Local {
@@ -199,6 +214,7 @@ impl Tables {
             radiosity: &self.radiosity,
             exitant: &self.exitant,
             means: &self.means,
+            peaks: &self.peaks,
             glossy_of_leaf: &self.gloss.glossy_of_leaf,
             specular: &self.gloss.specular,
             irradiance: &self.irradiance,
@@ -208,7 +224,8 @@ impl Tables {
                 leaf_count,
                 update_radiosity: u32::from(step.reflects),
                 sets_floor: u32::from(step.sets_floor),
-                undershoot: self.undershoot,
+                undershoot: step.bounced * self.undershoot,
+                damping: step.damping,
                 add_environment: u32::from(step.has_environment),
             },
         };
