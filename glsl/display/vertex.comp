@@ -1,8 +1,5 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/brdf.glsl"
-#include "lib/element.glsl"
-#include "lib/specular_albedo.glsl"
 
 // One thread per pixel: all light but the punctual one, interpolated between the vertices' irradiance.
 // reads the G-buffer, triangles, positions, direct_irradiance and indirect_irradiance [element_count] (W/m2),
@@ -28,6 +25,8 @@ layout(push_constant, scalar) uniform Params {
     uint shows_colors;  // direct_irradiance holds colours, shown unlit: each pixel that of the vertex it is nearest to
 } params;
 
+#include "display/vertex_light.glsl"
+
 void main()
 {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -37,27 +36,14 @@ void main()
     vec4 emitted = texelFetch(g_emission, pixel, 0);
     if (seen == 0 || (emitted.w <= 0.5 && params.shows_colors == 0)) return;
 
-    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
-    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
-    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
-    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, emitted.rgb, n.xyz, true);
-
-    uvec3 elements = triangles[seen - 1];
-    vec3 a = positions[elements.x], b = positions[elements.y], c = positions[elements.z];
-    if (dot(cross(b - a, c - a), to_eye) < 0.0) {
-        uvec3 backs = uvec3(back_elements[elements.x], back_elements[elements.y], back_elements[elements.z]);
-        if (backs.x != NO_ELEMENT) elements = backs;
-    }
-
-    // Interpolated irradiance reflects as if it came evenly from all sides, the specular lobe included.
-    vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
+    SeenPixel p = seen_pixel(pixel, seen);
     uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
     if (params.shows_colors != 0) {
-        uint nearest = w.x >= max(w.y, w.z) ? elements.x : w.y >= w.z ? elements.y : elements.z;
+        vec3 w = p.weights;
+        uint nearest = w.x >= max(w.y, w.z) ? p.elements.x : w.y >= w.z ? p.elements.y : p.elements.z;
         direct[index] += params.weight * direct_irradiance[nearest];
         return;
     }
-    vec3 reflectance = params.weight * (s.albedo + specular_albedo(s, dot(s.normal, to_eye))) / PI;
-    direct[index] += reflectance * (w.x * direct_irradiance[elements.x] + w.y * direct_irradiance[elements.y] + w.z * direct_irradiance[elements.z]);
-    indirect[index] += reflectance * (w.x * indirect_irradiance[elements.x] + w.y * indirect_irradiance[elements.y] + w.z * indirect_irradiance[elements.z]);
+    direct[index] += p.reflectance * INTERPOLATED(direct_irradiance, p);
+    indirect[index] += p.reflectance * INTERPOLATED(indirect_irradiance, p);
 }

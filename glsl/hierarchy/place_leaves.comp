@@ -3,7 +3,8 @@
 #include "lib/hierarchy.glsl"
 #include "lib/unit.glsl"
 
-// One thread per leaf: centre, vector area and extent of its vertex's cell, a third of each triangle around.
+// One thread per leaf: centre, vector area and extent of its vertex's cell, a third of each triangle around; and the rectangle
+// along its shortest edge that has the same second moments.
 // reads positions, normals [vertex_count] (m, unit), triangles, incident_offsets[vertex_count + 1], incident_triangles
 // updates leaves[leaf_count], nodes (of leaves)   shared none
 layout(local_size_x = 64) in;
@@ -15,6 +16,9 @@ layout(set = 0, binding = 4, scalar) readonly buffer IncidentTriangles { uint in
 layout(set = 0, binding = 5, scalar) buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 6, scalar) buffer Nodes { HierarchyNode nodes[]; };
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
+
+// Integral of the square of a linear function over a triangle of that area, from its values at the corners.
+float second_moment(float area, float a, float b, float c) { return area / 6.0 * (a * a + b * b + c * c + a * b + b * c + c * a); }
 
 void main()
 {
@@ -46,10 +50,41 @@ void main()
         radius = max(radius, distance(center, 0.5 * (own + c)));
     }
 
-    leaves[leaf].normal = unit_or(vector_area, normals[vertex]);
+    vec3 normal = unit_or(vector_area, normals[vertex]), edge = vec3(0.0);
+    float shortest = 1e30;
+    for (uint k = incident_offsets[vertex]; k < incident_offsets[vertex + 1]; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        for (uint corner = 0; corner < 3; ++corner) {
+            vec3 to = positions[v[corner]] - own;
+            if (v[corner] != vertex && dot(to, to) < shortest && dot(to, to) > 0.0) {
+                shortest = dot(to, to);
+                edge = to;
+            }
+        }
+    }
+    vec3 along = unit_or(edge - dot(edge, normal) * normal, unit_or(cross(normal, abs(normal.x) < 0.9 ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0)), vec3(1.0, 0.0, 0.0)));
+    vec3 across = cross(normal, along);
+    vec2 moments = vec2(0.0);
+    for (uint k = incident_offsets[vertex]; k < incident_offsets[vertex + 1]; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+        float sixth = length(cross(b - a, c - a)) / 12.0;
+        vec3 middle = (a + b + c) / 3.0 - center, o = own - center;
+        for (uint corner = 0; corner < 3; ++corner) {
+            if (v[corner] == vertex) continue;
+            vec3 half_way = 0.5 * (own + positions[v[corner]]) - center;
+            moments.x += second_moment(sixth, dot(o, along), dot(half_way, along), dot(middle, along));
+            moments.y += second_moment(sixth, dot(o, across), dot(half_way, across), dot(middle, across));
+        }
+    }
+    vec2 sides = area_sum > 0.0 ? sqrt(3.0 * moments / area_sum) : vec2(0.0);
+
+    leaves[leaf].normal = normal;
     leaves[leaf].area = length(vector_area);
     uint node = leaves[leaf].node;
     nodes[node].center = center;
     nodes[node].radius = radius;
     nodes[node].area = length(vector_area);
+    nodes[node].half_u = sides.x * along;
+    nodes[node].half_v = sides.y * across;
 }

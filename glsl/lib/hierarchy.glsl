@@ -12,6 +12,8 @@ struct HierarchyNode {
     uint shape;         // a leaf whose normal and flags are those of all below: its own, one of a flat surface's, else NONE
     uint surface;       // the flat surface that all below lies in, else NONE
     float margin;       // how far anything below may move from its place at rest, metres
+    vec3 half_u;        // of a rectangle in place of what lies below, if that is flat (shape): half of its sides, metres
+    vec3 half_v;
 };
 
 // One per vertex: both sides of its cell.

@@ -203,6 +203,8 @@ pub enum Display {
     /// Interpolate the solution between vertices
     #[default]
     Vertex,
+    /// Draw flat patches as rectangles that fade into one another (antiradiance)
+    Splat,
     /// Gather from the solution at every pixel, with visibility
     FinalGather,
     /// Filter the texels of the method's atlas (surface-shadow-maps)

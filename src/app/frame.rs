@@ -11,6 +11,7 @@ use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::irradiance_vector;
 use crate::display::shadow_maps::ShadowMaps;
+use crate::display::splat::{self, SplatLight, SplatSums};
 use crate::display::tone_map::LightParts;
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
@@ -61,6 +62,8 @@ pub struct VertexShown {
     shadow_maps: ShadowMaps,
     g_buffer: GBuffer,
     gather: Option<Gather>,
+    /// Where flat patches are drawn.
+    splat_sums: Option<SplatSums>,
 }
 
 /// The final gather, and the tree that the method's vertices fill.
@@ -167,7 +170,8 @@ impl Method {
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         let gather = Gather::of_display(context, request, stage, &*method)?;
-        Ok(Self::OnElements(Box::new(VertexShown { method, shadow_maps, g_buffer, gather })))
+        let splat_sums = splat_sums(context, request)?;
+        Ok(Self::OnElements(Box::new(VertexShown { method, shadow_maps, g_buffer, gather, splat_sums })))
     }
 
     /// The solution of `request.bounces` bounces alone.
@@ -207,6 +211,7 @@ impl Method {
             Self::OnElements(shown) => {
                 shown.g_buffer = g_buffer()?;
                 shown.gather = Gather::of_display(context, request, stage, &*shown.method)?;
+                shown.splat_sums = splat_sums(context, request)?;
             }
             Self::OnTexels(shown) => shown.show(context, request)?,
             Self::FaceClusters(shown) => shown.g_buffer = g_buffer()?,
@@ -251,7 +256,7 @@ impl Method {
                 Ok(())
             }
             Self::OnElements(shown) => {
-                let VertexShown { method, shadow_maps, g_buffer, gather } = &mut **shown;
+                let VertexShown { method, shadow_maps, g_buffer, gather, splat_sums } = &mut **shown;
                 if let Some(gather) = gather {
                     // One bounce less: the gather adds it.
                     method.solve(context, &explicit_stage(stage, watch), request.bounces.saturating_sub(1))?;
@@ -270,7 +275,14 @@ impl Method {
                         colors: colors.as_ref(),
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
-                    vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                    // False colours are those of vertices.
+                    match (splat_sums, method.splats(), light.colors) {
+                        (Some(sums), Some(splats), None) => {
+                            let light = SplatLight { vertices: light, splats, sums };
+                            splat::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                        }
+                        _ => vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film),
+                    }
                 });
                 recorder.submit()?;
                 Ok(())
@@ -304,6 +316,14 @@ impl Method {
                 partial.map_or(Ok(()), Err)
             }
         }
+    }
+}
+
+/// Where flat patches are drawn, if the display draws them.
+fn splat_sums(context: &Context, request: &RenderRequest) -> Result<Option<SplatSums>, AppError> {
+    match request.display {
+        Some(Display::Splat) => Ok(Some(SplatSums::new(context, request.width, request.height)?)),
+        _ => Ok(None),
     }
 }
 

@@ -8,6 +8,7 @@ use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::pick::picked_element;
 use crate::scene::camera::View;
 use crate::stages::elements::Elements;
+use crate::stages::splats::Splats;
 use crate::stages::world::World;
 use glam::{UVec2, Vec3};
 use serde_json::Value;
@@ -30,6 +31,11 @@ pub trait OnElements {
     /// by default as it is.
     fn look(&self, _: &Context, _: &World, _: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
         Ok((self.direct_irradiance(), self.indirect_irradiance()))
+    }
+
+    /// Flat patches for the splatting display, if the method has them.
+    fn splats(&self) -> Option<&Splats> {
+        None
     }
 
     /// The colours of the debug view that the settings ask for, if they do, for a picture of `size` pixels.
@@ -155,6 +161,10 @@ impl OnElements for Antiradiance {
         recorder.scope("look", |recorder| Self::look(self, recorder, world, view));
         recorder.submit()?;
         Ok((self.direct_irradiance(), self.shown_irradiance()))
+    }
+
+    fn splats(&self) -> Option<&Splats> {
+        Some(Self::splats(self))
     }
 
     fn false_colors(

@@ -82,6 +82,7 @@ pub fn displays(method: &Method) -> &'static [Display] {
         "path-tracing" => &[],
         "surface-shadow-maps" => &[Display::FinalGather, Display::Lightmap],
         "face-cluster" => &[Display::IrradianceVector],
+        "antiradiance" => &[Display::Vertex, Display::Splat, Display::FinalGather],
         _ => &[Display::Vertex, Display::FinalGather],
     }
 }
@@ -164,6 +165,8 @@ impl RenderRequest {
                 ("texels, not vertices", "final-gather or lightmap")
             } else if displays.contains(&Display::IrradianceVector) {
                 ("clusters of faces, not vertices", "irradiance-vector")
+            } else if displays.contains(&Display::Splat) {
+                ("vertices and patches, not an atlas", "vertex, splat or final-gather")
             } else {
                 ("vertices, not an atlas", "vertex or final-gather")
             };

@@ -6,6 +6,7 @@
 //! | [`g_buffer`] | which triangle each pixel sees, and the surface there |
 //! | [`direct`] | what every display stage starts from: background, emission, punctual light |
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
+//! | [`splat`] | the display stage that draws flat patches as rectangles that fade into one another |
 //! | [`lightmap`] | the display stage that filters the texels of an atlas |
 //! | [`irradiance_vector`] | the display stage that shades by the vector irradiance of elements, per pixel or per vertex |
 //! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
@@ -22,6 +23,7 @@ pub mod interface;
 pub mod irradiance_vector;
 pub mod lightmap;
 pub mod shadow_maps;
+pub mod splat;
 pub mod tone_map;
 pub mod vertex;
 

@@ -166,6 +166,8 @@ impl Maker<'_> {
             shape: NONE,
             surface: NONE,
             margin: 0.0,
+            half_u: Vec3::ZERO,
+            half_v: Vec3::ZERO,
         });
         self.plan.depths.push(depth);
         node

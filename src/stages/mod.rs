@@ -21,6 +21,7 @@ pub mod punctual;
 pub mod quadtree;
 pub mod scan;
 pub mod sender_tree;
+pub mod splats;
 pub mod surface_maps;
 pub mod texels;
 pub mod trace;

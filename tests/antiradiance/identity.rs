@@ -75,17 +75,16 @@ fn what_is_left_is_what_rays_see() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.7));
     let mut errors = Vec::new();
-    for bins in [128, 968] {
+    for bins in [72, 128, 968] {
         // Leaves alone are linked: both sides of the comparison have the same transfers.
         let settings = Settings { refinement: 1e-2, undershoot: 1e9, depth: 30, tolerance: 1e-5, ..settings(bins) };
         let (error, energy) = compare(&context, &fixture, settings);
         println!("{bins} bins: antiradiance differs from rays by {:.2} %, energy ratio {energy:.4}", 100.0 * error);
         errors.push(error);
     }
-    assert!(errors[1] < errors[0], "{errors:?}");
-    assert!(errors[1] < 0.1, "{errors:?}");
+    assert!(errors.is_sorted_by(|a, b| a > b) && errors[1] < 0.02, "{errors:?}");
     // Without antiradiance the difference is of another order: one step sees through everything.
     let (unoccluded, energy) = compare(&context, &fixture, Settings { refinement: 1e-2, depth: 1, ..settings(128) });
     println!("without antiradiance: {:.1} %, energy ratio {energy:.3}", 100.0 * unoccluded);
-    assert!(unoccluded > 2.0 * errors[0] && energy > 1.0);
+    assert!(unoccluded > 2.0 * errors[1] && energy > 1.0);
 }

@@ -111,15 +111,10 @@ fn a_step_agrees_with_its_twin() {
             let row = leaf.node as usize * m..(leaf.node as usize + 1) * m;
             let albedo = [leaf.element, leaf.back_element].map(|e| albedo.get(e as usize).copied().unwrap_or_default());
             let source = [source[2 * index], source[2 * index + 1]];
-            let twin = twins::local(
-                leaf,
-                norms[index],
-                &bins.bins,
-                &incident[row.clone()],
-                source,
-                albedo,
-                |side, bin| -undershoot * peaks[index * m + bin].max(1.0) * means[2 * index + side],
-            );
+            let twin =
+                twins::local(leaf, norms[index], &bins.bins, &incident[row.clone()], source, albedo, |side, bin| {
+                    -undershoot * peaks[index * m + bin].max(1.0) * means[2 * index + side]
+                });
             irradiance.extend(twin.irradiance);
             radiosity.extend(twin.radiosity);
             expected[row].copy_from_slice(&twin.exitant);

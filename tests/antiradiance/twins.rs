@@ -71,70 +71,89 @@ impl Transferring<'_> {
         &self.lists.1[self.lists.0[at] as usize..self.lists.0[at + 1] as usize]
     }
 
+    /// Normal and scale of cosines of a node within one flat surface, and whether light passes it from behind.
+    fn end(&self, node: &HierarchyNode) -> Option<(Vec3, f32, bool)> {
+        let leaf = self.leaves.get(node.shape as usize)?;
+        Some((leaf.normal, self.norms[node.shape as usize], leaf.flags & BLOCKS_BEHIND == 0))
+    }
+
+    /// Bin for light along `w` between two ends, and what a bin's worth of it weighs.
+    fn carried(&self, p: Option<(Vec3, f32, bool)>, q: Option<(Vec3, f32, bool)>, w: Vec3) -> Option<(u32, f32)> {
+        let m = self.bins.count();
+        let on_side = |end: Option<(Vec3, f32, bool)>, v: Vec3| {
+            end.is_none_or(|(normal, ..)| normal.dot(v) * normal.dot(w) > 0.0)
+        };
+        let near = self.list(0, self.bins.bin_of(w)).iter().map(|e| e.bin);
+        let at = |bin: u32| self.bins.directions[bin as usize];
+        let bin = near.into_iter().find(|&bin| on_side(p, at(bin)) && on_side(q, at(bin)))?;
+        let received =
+            p.map_or(1.0, |(normal, norm, _)| normal.dot(w).abs() / discrete_cosine(normal.dot(at(bin)), norm, m));
+        let sent = q.map_or(1.0, |(normal, norm, _)| 1.0 / discrete_cosine(normal.dot(at(bin)), norm, m));
+        Some((bin, received * sent))
+    }
+
     /// (receiver's cell, sender's entry, weight) from one node to another.
     pub fn transfers(&self, sender: u32, receiver: u32) -> Vec<(u32, u32, f32)> {
-        let (q, p) = (&self.nodes[sender as usize], &self.nodes[receiver as usize]);
-        let offset = p.center - q.center;
+        let (from, to) = (&self.nodes[sender as usize], &self.nodes[receiver as usize]);
+        let offset = to.center - from.center;
         let squared = offset.length_squared();
-        if squared <= 0.0 || q.area <= 0.0 {
+        if squared <= 0.0 || from.area <= 0.0 {
             return Vec::new();
         }
-        let (m, w) = (self.bins.count(), offset / squared.sqrt());
-        let leaf = |node: &HierarchyNode| (node.shape != NONE).then(|| &self.leaves[node.shape as usize]);
-        let (q_leaf, p_leaf) = (leaf(q), leaf(p));
-        let cosine = |leaf: Option<&HierarchyLeaf>, v: Vec3| leaf.map_or(0.0, |leaf| leaf.normal.dot(v));
-        let held = |node: &HierarchyNode, c: f32| discrete_cosine(c, self.norms[node.shape as usize], m);
-        let passes_behind = p_leaf.is_some_and(|leaf| leaf.flags & BLOCKS_BEHIND == 0);
-        let (q_cos, p_cos) = (cosine(q_leaf, w), cosine(p_leaf, w));
-
-        let solid_angle = if q_leaf.is_some() {
-            2.0 * PI * (1.0 - 1.0 / (1.0 + f64::from(q.area * q_cos.abs() / (PI * squared))).sqrt()) as f32
-        } else {
-            q.area / squared
-        };
+        let (m, w, q, p) = (self.bins.count(), offset / squared.sqrt(), self.end(from), self.end(to));
+        let disc = |area: f32| 2.0 * PI * (1.0 - 1.0 / (1.0 + f64::from(area / PI)).sqrt()) as f32;
+        let solid_angle = q.map_or(from.area / squared, |(normal, ..)| disc(from.area * normal.dot(w).abs() / squared));
         if solid_angle <= 0.0 {
             return Vec::new();
         }
         let coverage = solid_angle / self.bins.solid_angle();
-        let middle = self.bins.bin_of(w);
         let entry = |bin: u32, read: u32, weight: f32| (receiver * m + bin, sender * m + read, weight);
-        let doublings = coverage.log2();
-        let size_class = if doublings < 0.25 { 0 } else { ((2.0 * doublings).ceil() as u32).min(self.class_count) };
-        let on_side = |bin: u32| q_leaf.is_none() || cosine(q_leaf, self.bins.directions[bin as usize]) * q_cos > 0.0;
-        if q_leaf.is_none() || size_class == 0 {
-            if passes_behind && p_cos >= 0.0 {
-                return Vec::new();
+        let is_hidden = |v: Vec3| p.is_some_and(|(normal, _, passes_behind)| passes_behind && normal.dot(v) >= 0.0);
+
+        // A rectangle, sample by sample.
+        if let (Some((normal, ..)), true) = (q, coverage <= 4.0 && self.class_count > 0 && !self.is_gaussian) {
+            let side = ((2.0 * coverage.sqrt()).ceil() as u32).clamp(1, 4);
+            let mut found: Vec<(u32, f32, f32)> = Vec::new();
+            for (i, j) in (0..side * side).map(|s| (s % side, s / side)) {
+                let [a, b] = [i, j].map(|k| (k as f32 + 0.5) / side as f32 * 2.0 - 1.0);
+                let offset = to.center - (from.center + a * from.half_u + b * from.half_v);
+                let (squared, w) = (offset.length_squared(), offset.normalize());
+                if is_hidden(w) {
+                    continue;
+                }
+                let Some((bin, weight)) = self.carried(p, q, w) else { continue };
+                let own = disc(from.area / (side * side) as f32 * normal.dot(w).abs() / squared);
+                let covered = own / self.bins.solid_angle();
+                match found.iter_mut().find(|(other, ..)| *other == bin) {
+                    Some((_, sum, cover)) => (*sum, *cover) = (*sum + weight * covered, *cover + covered),
+                    None => found.push((bin, weight * covered, covered)),
+                }
             }
-            let received =
-                |bin: u32| p_leaf.is_none() || cosine(p_leaf, self.bins.directions[bin as usize]) * p_cos > 0.0;
-            let near = self.list(0, middle).iter().map(|e| e.bin).find(|&bin| on_side(bin) && received(bin));
-            return near
-                .map(|bin| {
-                    let v = self.bins.directions[bin as usize];
-                    let mut weight = coverage;
-                    if p_leaf.is_some() {
-                        weight *= p_cos.abs() / held(p, cosine(p_leaf, v));
-                    }
-                    if q_leaf.is_some() {
-                        weight /= held(q, cosine(q_leaf, v));
-                    }
-                    entry(bin, bin, weight)
-                })
-                .into_iter()
-                .collect();
+            return found.into_iter().map(|(bin, weight, cover)| entry(bin, bin, weight / cover.max(1.0))).collect();
         }
 
-        let list = self.list(size_class, middle);
-        let total: f32 = list.iter().filter(|e| on_side(e.bin)).map(|e| e.weight).sum();
-        let nearest = list.iter().map(|e| e.bin).find(|&bin| on_side(bin));
+        let doublings = coverage.log2();
+        let size_class = if doublings < 0.25 { 0 } else { ((2.0 * doublings).ceil() as u32).min(self.class_count) };
+        if size_class == 0 {
+            let carried = self.carried(p, q, w).filter(|_| !is_hidden(w));
+            return carried.map(|(bin, weight)| entry(bin, bin, coverage * weight)).into_iter().collect();
+        }
+        let at = |bin: u32| self.bins.directions[bin as usize];
+        let list: Vec<&SpreadEntry> = self
+            .list(size_class, self.bins.bin_of(w))
+            .iter()
+            .filter(|e| q.is_none_or(|(normal, ..)| normal.dot(at(e.bin)) * normal.dot(w) > 0.0))
+            .collect();
+        let total: f32 = list.iter().map(|e| e.weight).sum();
         let mut found = Vec::new();
-        for &SpreadEntry { bin, weight } in list.iter().filter(|e| on_side(e.bin)) {
-            if passes_behind && cosine(p_leaf, self.bins.directions[bin as usize]) >= 0.0 {
-                continue;
+        for &&SpreadEntry { bin, weight } in list.iter().filter(|e| !is_hidden(at(e.bin))) {
+            let read = if self.is_gaussian { list[0].bin } else { bin };
+            let mut share = coverage * weight / total;
+            if let Some((normal, norm, _)) = q {
+                share = if self.is_gaussian { share } else { share.min(1.0) };
+                share /= discrete_cosine(normal.dot(at(read)), norm, m);
             }
-            let share = coverage * weight / total;
-            let (read, share) = if self.is_gaussian { (nearest.unwrap_or(bin), share) } else { (bin, share.min(1.0)) };
-            found.push(entry(bin, read, share / held(q, cosine(q_leaf, self.bins.directions[read as usize]))));
+            found.push(entry(bin, read, share));
         }
         found
     }

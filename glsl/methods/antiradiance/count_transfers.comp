@@ -4,7 +4,7 @@
 #include "lib/hierarchy.glsl"
 
 // One thread per link, both of its directions: how many transfers arrive in each bin of each receiver.
-// reads links, nodes, leaves, bin_directions, spread_offsets, spread
+// reads links, nodes, leaves, cosine_norms, bin_directions, spread_offsets, spread
 // updates cell_offsets[node_count * bin_count + 1] (counts)   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Links { uvec2 links[]; };

@@ -4,29 +4,15 @@
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
 // means, peaks, has params.undershoot, and defines
 //     vec3 beside(uint bin)       radiance that arrives beside what the table holds
-#include "lib/brdf.glsl"
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
 #include "lib/specular_albedo.glsl"
 #include "methods/antiradiance/floor.glsl"
+#include "methods/antiradiance/glossy_surface.glsl"
 #include "methods/antiradiance/table.glsl"
 
 vec3 beside(uint bin);
-
-// The surface of a leaf as its specular lobe sees it, on the side of `normal`. No lobe is narrower than a bin.
-Surface glossy_surface(LeafGloss g, vec3 normal)
-{
-    Surface s;
-    s.albedo = vec3(0.0);
-    s.f0 = g.f0;
-    s.f90 = g.f90;
-    s.alpha = sqrt(g.alpha * g.alpha + 1.0 / float(BIN_COUNT));
-    s.emission = vec3(0.0);
-    s.normal = normal;
-    s.reflects = true;
-    return s;
-}
 
 // Radiance reflected towards `to_eye`: the lobe's albedo times the mean of what arrives within it, so that the sum over
 // few bins neither makes nor loses light.                                                        [Dachsbacher2007 Eq. 18]

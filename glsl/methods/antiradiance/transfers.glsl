@@ -7,9 +7,10 @@
 // The weight turns the sender's exitant intensity per area into the receiver's incident radiance: it is the share of the
 // bin that the sender covers.                                                        [Dachsbacher2007 Eqs. 15 to 17]
 // Differs from [Dachsbacher2007]: at leaves, and nodes within a flat surface, the cosines of the actual direction stand in for those of the bin, bins lie on
-// the side of the surface that the direction lies on, and a sender larger than a bin is read in each bin that it covers,
-// not in one (its own "accurate CPU implementation"). Nothing then passes from one bin into another, so that what a
-// surface lets through and takes away cancel bin by bin, and no chain of near surfaces can grow.
+// the side of the surface that the direction lies on, and a sender is read in each bin that it covers, not in one (its own
+// "accurate CPU implementation"): a flat one by samples of its rectangle, a large or uneven one by a cone. Nothing then
+// passes from one bin into another, and the footprints of a surface's parts tile as the parts do, so that what the surface
+// lets through and what it takes away cancel bin by bin.
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
@@ -17,80 +18,133 @@ void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, fl
 
 const float FOUR_PI = 12.5663706143592;
 
+const uint SAMPLES_A_SIDE = 4;              // of a footprint, at most
+const float MOST_SAMPLED = 4.0;             // bins: larger footprints are cones
+
+// An end of a link. Nodes within one flat surface have a normal like a leaf.
+struct End {
+    bool is_flat;
+    vec3 normal;
+    float norm;
+};
+
+End end_of(HierarchyNode node)
+{
+    if (node.shape == NONE) return End(false, vec3(0.0), 0.0);
+    return End(true, leaves[node.shape].normal, cosine_norms[node.shape]);
+}
+
+// Of a disc, seen from straight above, of that area over squared distance: never more than half of the sphere.
+float disc_solid_angle(float area)
+{
+    float ratio = area / (0.25 * FOUR_PI);
+    return 0.5 * FOUR_PI * (ratio / (sqrt(1.0 + ratio) * (sqrt(1.0 + ratio) + 1.0)));
+}
+
+// The bin that carries light along w: the nearest one on the sides of both ends that w itself is on.
+uint bin_between(End p, End q, vec3 w)
+{
+    float p_cos = dot(p.normal, w), q_cos = dot(q.normal, w);
+    uint middle = bin_of(w, params.bins.side);
+    uint last = spread_offsets[middle + 1];
+    for (uint k = spread_offsets[middle]; k < last; ++k) {
+        uint bin = spread[k].bin;
+        vec3 v = bin_directions[bin];
+        if (p.is_flat && dot(p.normal, v) * p_cos <= 0.0) continue;
+        if (q.is_flat && dot(q.normal, v) * q_cos <= 0.0) continue;
+        return bin;
+    }
+    return NONE;
+}
+
+// What `covered` bins' worth of light along w arrives as, by way of `bin`: irradiance is that of w.
+float weight_between(End p, End q, vec3 w, uint bin, float covered)
+{
+    vec3 v = bin_directions[bin];
+    if (p.is_flat) covered *= abs(dot(p.normal, w)) / discrete_cosine(dot(p.normal, v), p.norm, params.bins.count);
+    return q.is_flat ? covered / discrete_cosine(dot(q.normal, v), q.norm, params.bins.count) : covered;
+}
+
+// A flat sender's rectangle, sample by sample: footprints that tile a surface tile the bins.
+void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, End q, End p, bool passes_behind, float coverage)
+{
+    uint side = clamp(uint(ceil(2.0 * sqrt(coverage))), 1u, SAMPLES_A_SIDE), found = 0;
+    uint bins[SAMPLES_A_SIDE * SAMPLES_A_SIDE];
+    vec2 weights[SAMPLES_A_SIDE * SAMPLES_A_SIDE];      // and what is covered, in bins
+    for (uint s = 0; s < side * side; ++s) {
+        vec2 at = (vec2(s % side, s / side) + 0.5) / float(side) * 2.0 - 1.0;
+        vec3 offset = to.center - from.center - at.x * from.half_u - at.y * from.half_v;
+        float squared = dot(offset, offset);
+        if (!(squared > 0.0)) continue;
+        vec3 w = offset / sqrt(squared);
+        if (passes_behind && dot(p.normal, w) >= 0.0) continue;
+        uint bin = bin_between(p, q, w);
+        if (bin == NONE) continue;
+        float solid_angle = disc_solid_angle(from.area / float(side * side) * abs(dot(q.normal, w)) / squared);
+        float covered = solid_angle * float(params.bins.count) / FOUR_PI;
+        uint k = 0;
+        while (k < found && bins[k] != bin) ++k;
+        if (k == found) {
+            bins[found] = bin;
+            weights[found++] = vec2(0.0);
+        }
+        weights[k] += vec2(weight_between(p, q, w, bin, covered), covered);
+    }
+    // No bin is covered more than once: what is let through is then never more than what came.
+    for (uint k = 0; k < found; ++k) transfer(receiver, bins[k], sender, bins[k], weights[k].x / max(weights[k].y, 1.0));
+}
+
 void transfers_of(uint sender, uint receiver)
 {
-    HierarchyNode q = nodes[sender], p = nodes[receiver];
-    vec3 offset = p.center - q.center;
+    HierarchyNode from = nodes[sender], to = nodes[receiver];
+    vec3 offset = to.center - from.center;
     float squared = dot(offset, offset);
-    if (!(squared > 0.0) || q.area <= 0.0) return;
+    if (!(squared > 0.0) || from.area <= 0.0) return;
     vec3 w = offset / sqrt(squared);
-
-    // Nodes within one flat surface have a normal like a leaf.
-    bool p_is_flat = p.shape != NONE, q_is_flat = q.shape != NONE;
-    vec3 p_normal = vec3(0.0), q_normal = vec3(0.0);
-    float p_cos = 0.0, q_cos = 0.0, p_norm = 0.0, q_norm = 0.0;
-    bool passes_behind = false;
-    if (p_is_flat) {
-        p_normal = leaves[p.shape].normal;
-        p_norm = cosine_norms[p.shape];
-        p_cos = dot(p_normal, w);
-        passes_behind = (leaves[p.shape].flags & BLOCKS_BEHIND) == 0;
-    }
-    float bin_solid_angle = FOUR_PI / float(params.bins.count), solid_angle = q.area / squared;
-    if (q_is_flat) {
-        q_normal = leaves[q.shape].normal;
-        q_norm = cosine_norms[q.shape];
-        q_cos = dot(q_normal, w);
-        // Of a disc of the projected area, seen from straight above: never more than half of the sphere.
-        float ratio = q.area * abs(q_cos) / (0.5 * FOUR_PI * 0.5 * squared);
-        solid_angle = 0.5 * FOUR_PI * (ratio / (sqrt(1.0 + ratio) * (sqrt(1.0 + ratio) + 1.0)));
-    }
+    End q = end_of(from), p = end_of(to);
+    bool passes_behind = p.is_flat && (leaves[to.shape].flags & BLOCKS_BEHIND) == 0;
+    float q_cos = dot(q.normal, w);
+    float solid_angle = q.is_flat ? disc_solid_angle(from.area * abs(q_cos) / squared) : from.area / squared;
     if (!(solid_angle > 0.0)) return;
-    float coverage = solid_angle / bin_solid_angle;
+    float coverage = solid_angle * float(params.bins.count) / FOUR_PI;
 
-    uint middle = bin_of(w, params.bins.side);
+    bool is_cone = params.bins.class_count > 0 && params.bins.is_gaussian == 0;
+    if (is_cone && q.is_flat && coverage <= MOST_SAMPLED) {
+        sampled(sender, receiver, from, to, q, p, passes_behind, coverage);
+        return;
+    }
     // The class above, so that no bin is covered more than once and nothing is cut off.
     float doublings = log2(coverage);
     uint size_class = doublings < 0.25 ? 0u : min(uint(ceil(2.0 * doublings)), params.bins.class_count);
-    if (!q_is_flat || size_class == 0) {
-        if (passes_behind && p_cos >= 0.0) return;
-        uint first = spread_offsets[middle], last = spread_offsets[middle + 1];
-        for (uint k = first; k < last; ++k) {
-            uint bin = spread[k].bin;
-            vec3 v = bin_directions[bin];
-            float p_bin = dot(p_normal, v), q_bin = dot(q_normal, v);
-            if (p_is_flat && p_bin * p_cos <= 0.0) continue;
-            if (q_is_flat && q_bin * q_cos <= 0.0) continue;
-            float weight = coverage;
-            if (p_is_flat) weight *= abs(p_cos) / discrete_cosine(p_bin, p_norm, params.bins.count);
-            if (q_is_flat) weight /= discrete_cosine(q_bin, q_norm, params.bins.count);
-            transfer(receiver, bin, sender, bin, weight);
-            return;
-        }
+    uint middle = bin_of(w, params.bins.side);
+    if (size_class == 0) {
+        uint bin = bin_between(p, q, w);
+        if (bin == NONE || (passes_behind && dot(p.normal, w) >= 0.0)) return;
+        transfer(receiver, bin, sender, bin, weight_between(p, q, w, bin, coverage));
         return;
     }
 
     uint list = size_class * params.bins.count + middle;
     uint first = spread_offsets[list], last = spread_offsets[list + 1];
     float total = 0.0;
-    for (uint k = first; k < last; ++k)
-        if (dot(q_normal, bin_directions[spread[k].bin]) * q_cos > 0.0) total += spread[k].weight;
-    if (!(total > 0.0)) return;
-
     // The bin that a Gaussian reads: the nearest one on the sender's side.
-    uint read_bin = spread[first].bin;
-    for (uint k = last; k-- > first;)
-        if (dot(q_normal, bin_directions[spread[k].bin]) * q_cos > 0.0) read_bin = spread[k].bin;
+    uint read_bin = NONE;
+    for (uint k = first; k < last; ++k) {
+        if (q.is_flat && dot(q.normal, bin_directions[spread[k].bin]) * q_cos <= 0.0) continue;
+        if (read_bin == NONE) read_bin = spread[k].bin;
+        total += spread[k].weight;
+    }
+    if (!(total > 0.0)) return;
     for (uint k = first; k < last; ++k) {
         uint bin = spread[k].bin;
         vec3 v = bin_directions[bin];
-        if (dot(q_normal, v) * q_cos <= 0.0 || (passes_behind && dot(p_normal, v) >= 0.0)) continue;
+        if ((q.is_flat && dot(q.normal, v) * q_cos <= 0.0) || (passes_behind && dot(p.normal, v) >= 0.0)) continue;
         float weight = coverage * spread[k].weight / total;
         if (params.bins.is_gaussian == 0) {
             read_bin = bin;
-            weight = min(weight, 1.0);
+            if (q.is_flat) weight = min(weight, 1.0);
         }
-        weight /= discrete_cosine(dot(q_normal, bin_directions[read_bin]), q_norm, params.bins.count);
+        if (q.is_flat) weight /= discrete_cosine(dot(q.normal, bin_directions[read_bin]), q.norm, params.bins.count);
         transfer(receiver, bin, sender, read_bin, weight);
     }
 }

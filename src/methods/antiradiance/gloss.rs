@@ -129,6 +129,34 @@ pub(super) fn measure(
 }
 
 impl Antiradiance {
+    /// What glossy leaves send of the light of punctual lights and sampled emitters, beside what came along links.
+    pub(super) fn reflect_direct(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let (gloss, elements, emitters) = (&self.tables.gloss, &self.elements, &self.emitters);
+        let pass = passes::ReflectDirect {
+            glossy_leaves: &gloss.leaves,
+            leaves: &self.hierarchy.leaves,
+            gloss: &gloss.lobes,
+            bin_directions: &self.bins.directions,
+            element_positions: &elements.positions,
+            lights: &world.lights,
+            visibility: &self.state.visibility,
+            samples: &emitters.samples,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            emission: &elements.emission,
+            visible: &emitters.visible,
+            base: &gloss.base,
+            constants: passes::ReflectDirectConstants { bin_count: self.tables.bin_count },
+            params: passes::ReflectDirectParams {
+                glossy_count: gloss.count,
+                element_count: elements.count,
+                light_count: world.light_count,
+                sample_count: emitters.plan.samples.len() as u32,
+            },
+        };
+        recorder.dispatch(&pass, gloss.count * self.tables.bin_count);
+    }
+
     /// Indirect light as the eye of `view` sees it: glossy leaves by their lobes.
     pub fn look(&self, recorder: &mut Recorder<'_>, world: &World, view: &View) {
         let shown = &self.state.shown;

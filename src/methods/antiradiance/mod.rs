@@ -30,8 +30,7 @@
 //! radiance may not fall far below zero (selectable); near senders are discs, never more than half of the
 //! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
-//! What it does not do: transparent surfaces, refinement by the light that is sent, splatting, specular reflection of
-//! punctual lights and sampled emitters into the bins (the display adds it).
+//! What it does not do: transparent surfaces, refinement by the light that is sent.
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
@@ -63,6 +62,7 @@ use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::emitters::Emitters;
 use crate::stages::hierarchy::{Behind, Hierarchy, HierarchyPlan};
 use crate::stages::punctual;
+use crate::stages::splats::Splats;
 use crate::stages::work::{Interrupted, Watch};
 use crate::stages::world::World;
 use glam::Vec3;
@@ -95,6 +95,7 @@ pub struct Antiradiance {
     elements: Elements,
     emitters: Emitters,
     hierarchy: Hierarchy,
+    splats: Splats,
     bins: DeviceBins,
     links: NodeLinks,
     transfers: Transfers,
@@ -162,6 +163,7 @@ impl Antiradiance {
         let plan = HierarchyPlan::new(&elements, &surfaces, stage.rest_positions, behind, margin);
         let budget = check_memory(context, &plan, &settings, budget)?;
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
+        let splats = Splats::new(context, &hierarchy, &surfaces, stage.geometry)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
         let (bin_count, threshold) = (settings.bins.get(), settings.gloss_threshold);
         let gloss = Gloss::new(context, &hierarchy, &elements, stage.world, threshold, bin_count)?;
@@ -184,6 +186,7 @@ impl Antiradiance {
             elements,
             emitters,
             hierarchy,
+            splats,
             bins,
             links,
             transfers,
@@ -205,6 +208,7 @@ impl Antiradiance {
         self.elements.place(&mut recorder, stage.world);
         self.elements.update_materials(&mut recorder, stage.world);
         self.hierarchy.place(&mut recorder, &self.elements, stage.world);
+        self.splats.place(&mut recorder, &self.hierarchy);
         self.tables.update_norms(&mut recorder, &self.hierarchy, &self.bins);
         recorder.submit()?;
         if !standing_links {
@@ -280,6 +284,7 @@ impl Antiradiance {
         self.to_elements(recorder, &self.tables.linked, &s.direct);
         elements.add(recorder, &s.irradiance, &s.direct);
         elements.add(recorder, &s.punctual, &s.irradiance);
+        self.reflect_direct(recorder, world);
     }
 
     /// The leaves' sources: what they emit along links, or what they reflect of all direct light.
@@ -336,6 +341,11 @@ impl Antiradiance {
 
     pub fn hierarchy(&self) -> &Hierarchy {
         &self.hierarchy
+    }
+
+    /// Its leaves on flat surfaces, for display.
+    pub fn splats(&self) -> &Splats {
+        &self.splats
     }
 
     pub fn bins(&self) -> &DeviceBins {

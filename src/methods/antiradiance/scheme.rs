@@ -10,6 +10,8 @@ use serde::Serialize;
 const GROWTH_LIMIT: f64 = 1e4;
 /// Steps over which a growth rate is estimated.
 const GROWTH_STEPS: usize = 4;
+/// Changes of the light below this share are rounding.
+const LEAST_CHANGE: f64 = 1e-3;
 /// Share of a step below which the symmetric scheme gives up.
 const LEAST_DAMPING: f32 = 1.0 / 16.0;
 /// Bounds what [`LocalStep::bounced`] grows to.
@@ -44,6 +46,14 @@ pub fn growth_rate(residuals: &[Residual]) -> Option<f64> {
     let first = last.checked_sub(GROWTH_STEPS)?;
     let (before, after) = (residuals[first].change, residuals[last].change);
     (before > 0.0 && after.is_finite()).then(|| (after / before).powf(1.0 / GROWTH_STEPS as f64))
+}
+
+/// Whether changes rise, every other step's on its own: an iteration may swing between two states.
+fn is_rising(residuals: &[Residual]) -> bool {
+    match residuals {
+        [_, .., a, b, c, d] => c.change > a.change && d.change > b.change && d.relative() > LEAST_CHANGE,
+        _ => false,
+    }
 }
 
 impl Antiradiance {
@@ -113,31 +123,34 @@ impl Antiradiance {
         Ok(())
     }
 
-    /// Light and antiradiance together; where that grows, anew with shorter steps.         [Dachsbacher2007 2.2]
+    /// Light and antiradiance together; where changes grow, in shorter steps from there on.   [Dachsbacher2007 2.2]
     /// Differs from [Dachsbacher2007]: damped where needed, which brings every iteration to rest whose eigenvalues have
     /// real parts below one; plain steps need magnitudes below one.
     fn iterate(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
-        let before = self.residuals.len();
         self.damping = self.settings.damping;
-        loop {
-            self.start(context)?;
-            let outcome = (1..=self.settings.iterations).try_for_each(|iteration| {
-                watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
-                let sets_floor = iteration == 1;
-                let (bounced, damping) = (self.bounced, self.damping);
-                let step = LocalStep { reflects: true, sets_floor, bounced, damping, ..LocalStep::default() };
-                self.step_once(context, iteration, step).map(|_| ())
-            });
-            match outcome {
-                Err(AntiradianceError::Growth { steps, rate, .. }) if self.damping > LEAST_DAMPING => {
-                    self.damping *= 0.5;
-                    let damping = self.damping;
-                    tracing::info!("antiradiance grows by {rate:.2} a step after {steps}: damped by {damping}");
-                    self.residuals.truncate(before);
-                }
-                outcome => return outcome,
+        self.start(context)?;
+        let mut first = self.residuals.len();
+        for iteration in 1..=self.settings.iterations {
+            watch.step("antiradiance", u64::from(iteration) - 1, self.settings.iterations.into())?;
+            let (bounced, damping) = (self.bounced, self.damping);
+            let step =
+                LocalStep { reflects: true, sets_floor: iteration == 1, bounced, damping, ..LocalStep::default() };
+            self.step_once(context, iteration, step)?;
+            let own = &self.residuals[first..];
+            if !is_rising(own) {
+                continue;
             }
+            // Of whole steps: a step of share d multiplies by 1 - d + d * rate.
+            let share = f64::from(damping);
+            let rate = growth_rate(own).map_or(f64::INFINITY, |rate| (rate - 1.0 + share) / share);
+            if self.damping <= LEAST_DAMPING {
+                return Err(AntiradianceError::Growth { steps: iteration, rate, scheme: "symmetric" });
+            }
+            (self.damping, first) = ((0.5 * self.damping).max(LEAST_DAMPING), self.residuals.len());
+            let damping = self.damping;
+            tracing::info!("changes grow by {rate:.2} a step after {iteration} steps; damped by {damping}");
         }
+        Ok(())
     }
 
     /// Moves antiradiance on until it changes no more, light being what it is.            [Dachsbacher2007 Eq. 14]
@@ -226,6 +239,14 @@ mod tests {
         let residual =
             |(step, &change)| Residual { step: step as u32 + 1, bounce: 1, reflects: true, change, total: 1.0 };
         changes.iter().enumerate().map(residual).collect()
+    }
+
+    #[test]
+    fn swinging_without_growth_is_not_rising() {
+        assert!(!is_rising(&residuals(&[3.0, 1.0, 2.9, 0.9, 2.8])));
+        assert!(is_rising(&residuals(&[3.0, 1.0, 3.1, 1.1, 3.2])));
+        assert!(!is_rising(&residuals(&[1.0, 2.0, 3.0, 4.0])), "too few to tell");
+        assert!(!is_rising(&residuals(&[1e-5, 2e-5, 3e-5, 4e-5, 5e-5])), "rounding");
     }
 
     #[test]

@@ -199,7 +199,8 @@ impl Tables {
         step: LocalStep,
     ) {
         if step.reflects {
-            recorder.scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
+            recorder
+                .scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
         }
         let leaf_count = hierarchy.leaf_count();
         let pass = passes::Local {

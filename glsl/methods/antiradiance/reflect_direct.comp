@@ -1,0 +1,77 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/brdf.glsl"
+#include "lib/direction_bins.glsl"
+#include "lib/emitter.glsl"
+#include "lib/hierarchy.glsl"
+#include "lib/leaf_gloss.glsl"
+#include "lib/light.glsl"
+
+// One thread per (glossy leaf, bin): radiance that its specular lobe sends along the bin of the light of punctual lights and
+// sampled emitters, which comes along no link.                                    [Dachsbacher2007 3.3, 4.2 local pass, Eq. 18]
+// reads glossy_leaves[glossy_count], leaves, gloss, bin_directions, element_positions[element_count] (m), lights[light_count],
+// visibility[light_count * element_count], samples[sample_count], triangles, positions, emission[element_count] (W m^-2 sr^-1),
+// visible[element_count * ceil(sample_count / 32)] (bits)   adds to base[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
+layout(local_size_x = 64) in;
+layout(constant_id = 1) const uint BIN_COUNT = 128;
+layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer ElementPositions { vec3 element_positions[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Lights { Light lights[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Visibility { float visibility[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Samples { EmitterSample samples[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Emission { vec3 emission[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer Visible { uint visible[]; };
+layout(set = 0, binding = 12, scalar) buffer Base { vec3 base[]; };
+layout(push_constant, scalar) uniform Params {
+    uint glossy_count;
+    uint element_count;
+    uint light_count;
+    uint sample_count;
+} params;
+
+#include "methods/antiradiance/glossy_surface.glsl"
+
+// Of the lobe towards the bin's direction, 1/sr, times the cosine towards the light.
+vec3 lobe(Surface s, vec3 to_eye, vec3 to_light) { return brdf_value(s, to_eye, to_light) * max(dot(s.normal, to_light), 0.0); }
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= params.glossy_count * BIN_COUNT) return;
+    uint leaf = glossy_leaves[i / BIN_COUNT];
+    HierarchyLeaf own = leaves[leaf];
+    vec3 w = bin_directions[i % BIN_COUNT];
+    bool leaves_front = dot(own.normal, w) > 0.0;
+    uint element = leaves_front ? own.element : own.back_element;
+    if (element == NONE) return;
+    Surface s = glossy_surface(gloss[leaf], leaves_front ? own.normal : -own.normal);
+    vec3 position = element_positions[element], sum = vec3(0.0);
+
+    for (uint light = 0; light < params.light_count; ++light) {
+        vec3 to_light;
+        float distance_to_light;
+        vec3 arriving = light_irradiance(lights[light], position, to_light, distance_to_light);
+        sum += visibility[light * params.element_count + element] * arriving * lobe(s, w, to_light);
+    }
+    uint words = (params.sample_count + 31) / 32;
+    for (uint k = 0; k < params.sample_count; ++k) {
+        if ((visible[element * words + k / 32] >> k % 32 & 1) == 0) continue;
+        EmitterSample at = samples[k];
+        uvec3 v = triangles[at.triangle];
+        EmitterPoint point = emitter_point(at, positions[v.x], positions[v.y], positions[v.z]);
+        // As a disc, like its diffuse light.
+        vec3 offset = point.position - position;
+        float squared = dot(offset, offset);
+        vec3 to_light = squared > 0.0 ? offset / sqrt(squared) : s.normal;
+        vec3 radiance = (1.0 - at.barycentrics.x - at.barycentrics.y) * emission[v.x]
+                        + at.barycentrics.x * emission[v.y] + at.barycentrics.y * emission[v.z];
+        float solid_angle = max(emitter_cosine(at, point, -to_light), 0.0) * point.area / (squared + point.area / PI);
+        sum += solid_angle * radiance * lobe(s, w, to_light);
+    }
+    base[i] += sum;
+}

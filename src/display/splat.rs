@@ -1,0 +1,105 @@
+//! Splatting display: flat patches as rectangles that fade into one another, everything else between vertices; punctual
+//! light per pixel by shadow maps.                                                        [Dachsbacher2007 4.3]
+//!
+//! Three passes: which surface each pixel sees (the G-buffer's triangles, by the surface of each); the patches' light,
+//! weighted; the sums divided by the weights. Light is thus shown where it was computed, at the patches' centres.
+//!
+//! [Dachsbacher2007]: crate::methods::PAPERS
+
+use super::direct::{self, Sample};
+use super::g_buffer::GBuffer;
+use super::shadow_maps::ShadowMaps;
+use super::vertex::VertexLight;
+use super::{PixelView, sample_offset};
+use crate::gpu::shaders::display::{Splat, SplatNormalize, SplatNormalizeParams, SplatParams};
+use crate::gpu::{Blend, Context, Format, GpuError, Image, ImageDescription, Load, RasterState, Recorder, Shape, Target};
+use crate::scene::camera::View;
+use crate::stages::film::Film;
+use crate::stages::splats::Splats;
+use crate::stages::world::World;
+use glam::UVec2;
+
+/// Corners of the two triangles of a splat: `SPLAT_CORNERS` of `lib/splat.glsl`.
+const CORNERS: u32 = 6;
+
+/// Sums of weighted irradiance by pixel, W/m2, with the weights.
+pub struct SplatSums {
+    direct: Image,
+    indirect: Image,
+}
+
+impl SplatSums {
+    pub fn new(context: &Context, width: u32, height: u32) -> Result<Self, GpuError> {
+        let image = |name| {
+            let (format, shape) = (Format::Rgba32Float, Shape::Flat);
+            context.image(&ImageDescription { name, width, height, layers: 1, mip_levels: 1, format, shape })
+        };
+        Ok(Self { direct: image("splats/direct")?, indirect: image("splats/indirect")? })
+    }
+}
+
+/// What the display draws.
+#[derive(Clone, Copy)]
+pub struct SplatLight<'a> {
+    pub vertices: VertexLight<'a>,
+    pub splats: &'a Splats,
+    pub sums: &'a SplatSums,
+}
+
+/// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
+#[expect(clippy::too_many_arguments, reason = "everything a picture is made of, each by its own type")]
+pub fn draw(
+    recorder: &mut Recorder<'_>,
+    world: &World,
+    light: SplatLight<'_>,
+    shadow_maps: &ShadowMaps,
+    g_buffer: &GBuffer,
+    view: &View,
+    samples: u32,
+    film: &Film,
+) {
+    let size = UVec2::new(film.width, film.height);
+    let SplatLight { vertices, splats, sums } = light;
+    for sample in 0..samples {
+        let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
+        recorder.scope("sample", |recorder| {
+            let sample = Sample { index: sample, samples, is_unlit: false };
+            direct::draw(recorder, world, shadow_maps, g_buffer, &pixel_view, sample, film);
+            let splat = Splat {
+                splats: &splats.splats,
+                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+                g_position: g_buffer.sampled(&g_buffer.position),
+                triangle_surfaces: &splats.triangle_surfaces,
+                direct_irradiance: vertices.direct_irradiance,
+                indirect_irradiance: vertices.indirect_irradiance,
+                params: SplatParams {
+                    clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(),
+                    eye: pixel_view.eye,
+                },
+            };
+            let clear = Load::Clear([0.0; 4]);
+            let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
+            let state = RasterState { blend: Blend::, ..RasterState::default() };
+            recorder.draw(&splat, &target, state, CORNERS, splats.count);
+            let normalize = SplatNormalize {
+                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+                g_position: g_buffer.sampled(&g_buffer.position),
+                g_normal: g_buffer.sampled(&g_buffer.normal),
+                g_albedo: g_buffer.sampled(&g_buffer.albedo),
+                g_specular: g_buffer.sampled(&g_buffer.specular),
+                g_emission: g_buffer.sampled(&g_buffer.emission),
+                triangles: &world.triangles,
+                positions: &world.positions,
+                direct_irradiance: vertices.direct_irradiance,
+                indirect_irradiance: vertices.indirect_irradiance,
+                back_elements: vertices.back_elements,
+                direct: &film.direct,
+                indirect: &film.indirect,
+                direct_splats: g_buffer.sampled(&sums.direct),
+                indirect_splats: g_buffer.sampled(&sums.indirect),
+                params: SplatNormalizeParams { eye: pixel_view.eye, weight: 1.0 / samples as f32 },
+            };
+            recorder.dispatch(&normalize, [film.width, film.height]);
+        });
+    }
+}

@@ -1,0 +1,58 @@
+//! The flat patches of a hierarchy, as the splatting display draws them: one rectangle per leaf of a flat surface.
+
+use super::hierarchy::{Hierarchy, NONE};
+use crate::gpu::shaders::hierarchy::{PlaceSplats, PlaceSplatsParams};
+use crate::gpu::shaders::types::Splat;
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::geometry::Geometry;
+use crate::scene::surfaces::Surfaces;
+
+/// Splats on the device, and which surface each triangle belongs to.
+pub struct Splats {
+    pub count: u32,
+    pub splats: Buffer<Splat>,
+    /// Per triangle: its flat surface, or [`NONE`] where vertices are to be interpolated.
+    pub triangle_surfaces: Buffer<u32>,
+    leaves: Buffer<u32>,
+}
+
+impl Splats {
+    /// Of the hierarchy as it stands; [`Self::place`] follows it.
+    pub fn new(
+        context: &Context,
+        hierarchy: &Hierarchy,
+        surfaces: &Surfaces,
+        geometry: &Geometry,
+    ) -> Result<Self, GpuError> {
+        let plan = &hierarchy.plan;
+        let is_flat = |leaf: u32| plan.nodes[plan.leaves[leaf as usize].node as usize].surface != NONE;
+        let leaves: Vec<u32> = (0..hierarchy.leaf_count()).filter(|&leaf| is_flat(leaf)).collect();
+        let surface_of = |&[corner, ..]: &[u32; 3]| {
+            let surface = surfaces.of_vertex[corner as usize];
+            if surfaces.is_flat[surface as usize] { surface } else { NONE }
+        };
+        let triangle_surfaces: Vec<u32> = geometry.triangles.iter().map(surface_of).collect();
+        let splats = Self {
+            count: leaves.len() as u32,
+            splats: context.buffer("splats/rectangles", leaves.len())?,
+            triangle_surfaces: context.upload("splats/triangle surfaces", &triangle_surfaces)?,
+            leaves: context.upload("splats/leaves", &leaves)?,
+        };
+        let mut recorder = context.recorder("splats")?;
+        splats.place(&mut recorder, hierarchy);
+        recorder.submit()?;
+        Ok(splats)
+    }
+
+    /// Follows the hierarchy's leaves.
+    pub fn place(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
+        let pass = PlaceSplats {
+            splat_leaves: &self.leaves,
+            leaves: &hierarchy.leaves,
+            nodes: &hierarchy.nodes,
+            splats: &self.splats,
+            params: PlaceSplatsParams { splat_count: self.count },
+        };
+        recorder.dispatch(&pass, self.count);
+    }
+}
