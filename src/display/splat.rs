@@ -12,7 +12,9 @@ use super::shadow_maps::ShadowMaps;
 use super::vertex::VertexLight;
 use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display::{Splat, SplatNormalize, SplatNormalizeParams, SplatParams};
-use crate::gpu::{Blend, Context, Format, GpuError, Image, ImageDescription, Load, RasterState, Recorder, Shape, Target};
+use crate::gpu::{
+    Blend, Context, Format, GpuError, Image, ImageDescription, Load, RasterState, Recorder, Shape, Target,
+};
 use crate::scene::camera::View;
 use crate::stages::film::Film;
 use crate::stages::splats::Splats;
@@ -79,7 +81,7 @@ pub fn draw(
             };
             let clear = Load::Clear([0.0; 4]);
             let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
-            let state = RasterState { blend: Blend::, ..RasterState::default() };
+            let state = RasterState { blend: Blend::Add, ..RasterState::default() };
             recorder.draw(&splat, &target, state, CORNERS, splats.count);
             let normalize = SplatNormalize {
                 visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),

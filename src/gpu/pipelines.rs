@@ -27,6 +27,8 @@ pub enum Blend {
     Replace,
     /// Colours are premultiplied by their alpha and laid over.
     Over,
+    /// Colours and alphas are added up.
+    Add,
 }
 
 /// Fixed-function state of a raster pass.
@@ -316,13 +318,14 @@ impl Pipelines {
             .depth_test_enable(state.depth_test)
             .depth_write_enable(state.depth_test)
             .depth_compare_op(vk::CompareOp::GREATER);
+        let kept = if state.blend == Blend::Add { vk::BlendFactor::ONE } else { vk::BlendFactor::ONE_MINUS_SRC_ALPHA };
         let blend = vk::PipelineColorBlendAttachmentState {
-            blend_enable: vk::Bool32::from(state.blend == Blend::Over),
+            blend_enable: vk::Bool32::from(state.blend != Blend::Replace),
             src_color_blend_factor: vk::BlendFactor::ONE,
-            dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+            dst_color_blend_factor: kept,
             color_blend_op: vk::BlendOp::ADD,
             src_alpha_blend_factor: vk::BlendFactor::ONE,
-            dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+            dst_alpha_blend_factor: kept,
             alpha_blend_op: vk::BlendOp::ADD,
             color_write_mask: vk::ColorComponentFlags::RGBA,
         };

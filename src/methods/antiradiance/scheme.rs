@@ -48,6 +48,13 @@ pub fn growth_rate(residuals: &[Residual]) -> Option<f64> {
     (before > 0.0 && after.is_finite()).then(|| (after / before).powf(1.0 / GROWTH_STEPS as f64))
 }
 
+/// Estimate of the spectral radius of whole steps from those of share `damping`: such a step multiplies by
+/// `1 - damping + damping * radius`.
+fn spectral_radius(residuals: &[Residual], damping: f32) -> f64 {
+    let share = f64::from(damping);
+    growth_rate(residuals).map_or(f64::INFINITY, |rate| (rate - 1.0 + share) / share)
+}
+
 /// Whether changes rise, every other step's on its own: an iteration may swing between two states.
 fn is_rising(residuals: &[Residual]) -> bool {
     match residuals {
@@ -140,9 +147,7 @@ impl Antiradiance {
             if !is_rising(own) {
                 continue;
             }
-            // Of whole steps: a step of share d multiplies by 1 - d + d * rate.
-            let share = f64::from(damping);
-            let rate = growth_rate(own).map_or(f64::INFINITY, |rate| (rate - 1.0 + share) / share);
+            let rate = spectral_radius(own, damping);
             if self.damping <= LEAST_DAMPING {
                 return Err(AntiradianceError::Growth { steps: iteration, rate, scheme: "symmetric" });
             }
@@ -222,7 +227,7 @@ impl Antiradiance {
         }
         Err(AntiradianceError::Growth {
             steps: last.step,
-            rate: growth_rate(&self.residuals).unwrap_or(f64::INFINITY),
+            rate: spectral_radius(&self.residuals, if last.reflects { self.damping } else { 1.0 }),
             scheme: match self.settings.scheme {
                 Scheme::Symmetric => "symmetric",
                 Scheme::Asymmetric => "asymmetric",
