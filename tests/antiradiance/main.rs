@@ -7,10 +7,12 @@ mod dynamics;
 #[path = "../explicit_visibility/fixture.rs"]
 #[allow(dead_code, reason = "its own method's part is not needed here")]
 mod fixture;
+mod gloss;
 mod identity;
 mod invariants;
 mod kernels;
 mod physics;
+mod places;
 mod schemes;
 mod support;
 mod twins;

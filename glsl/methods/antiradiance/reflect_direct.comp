@@ -11,7 +11,7 @@
 // sampled emitters, which comes along no link.                                    [Dachsbacher2007 3.3, 4.2 local pass, Eq. 18]
 // reads glossy_leaves[glossy_count], leaves, gloss, bin_directions, element_positions[element_count] (m), lights[light_count],
 // visibility[light_count * element_count], samples[sample_count], triangles, positions, emission[element_count] (W m^-2 sr^-1),
-// visible[element_count * ceil(sample_count / 32)] (bits)   adds to base[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
+// visible[element_count * ceil(sample_count / 32)] (bits)   updates base[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };

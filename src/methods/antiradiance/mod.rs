@@ -18,6 +18,7 @@
 //! | f | Lambert, and GGX at leaves of [`Settings::gloss_threshold`] and more | sr^-1 | [`Gloss`] |
 //! | K, J | local pass: reflection, go-through | – | – |
 //! | E | `source`, as radiosity | W/m2 | `antiradiance/source` |
+//! | – | `means`, `peaks`: what arrived before anything was taken away | W m^-2 sr^-1, 1 | `antiradiance/means`, `antiradiance/peaks` |
 //! | A | the negative part of `exitant` | W m^-2 sr^-1 | `antiradiance/exitant` |
 //!
 //! **Per frame without link work:** lights, emission that stays where it is, albedo, the environment. **With new form
@@ -25,10 +26,10 @@
 //! ([`Antiradiance::follow`]).
 //!
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
-//! and bins at leaves are those of the actual direction; a sender larger than a bin is read in every bin that it covers
-//! (selectable); open surfaces block light that meets their backs; incident
-//! radiance may not fall far below zero (selectable); near senders are discs, never more than half of the
-//! sphere; links are made on the device. Direct light of punctual lights and sampled emitters is that of shadow rays.
+//! and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat one by
+//! samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance may not fall
+//! far below zero (selectable); the symmetric scheme is damped where it grows; near senders are discs, never more than
+//! half of the sphere; links are made on the device. The patches of flat parts are the cells of their vertices. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
 //!

@@ -43,7 +43,7 @@ crate::settings! {
         depth: u32 = 8, range 1..=1000, unit "steps", paper "the scene's depth complexity";
         /// Antiradiance has settled where a step changes less than this share of the light.
         tolerance: f32 = 0.002, range 0.0..=1.0, paper "not given";
-        /// How a sender larger than a bin spreads over the receiver's bins.
+        /// How a sender spreads over the receiver's bins.
         spread: Spread = Spread::Cone, paper "gaussian";
         /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
         refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
