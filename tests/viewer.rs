@@ -203,6 +203,34 @@ fn rgb(path: &Path) -> image::RgbImage {
     image::open(path).unwrap().to_rgb8()
 }
 
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, bound: u64) -> i32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) % bound) as i32
+    }
+}
+
+/// Counts that F5 makes the viewer say: frames, pipelines, bytes on the device; one line each time.
+fn counts(said: &str) -> Vec<[u64; 3]> {
+    let lines = said.lines().filter(|line| line.contains("frames shown"));
+    lines
+        .map(|line| {
+            let numbers: Vec<u64> =
+                line.split(|c: char| !c.is_ascii_digit() && c != '.').filter_map(|word| word.parse().ok()).collect();
+            numbers[numbers.len() - 3..].try_into().unwrap()
+        })
+        .collect()
+}
+
+/// Actions of [`nothing_done_at_random_leaves_a_trace`]; LINKLIGHT_ACTIONS=200 for a longer drive.
+const ACTIONS: &str = "24";
+
 const SMALL: &str = "builtin:cornell-box --bare --size 160x120 --elements 500 --bounces 1 --set rays_per_element=64";
 
 #[test]
@@ -238,4 +266,81 @@ fn the_window_shows_what_a_headless_render_of_its_state_shows() {
     }
     assert!(looks_alike(&grabbed, &headless(&other, "")), "the screen shows it too: {}", grabbed.display());
     assert!(!looks_alike(&headless(&other, "--exposure=0.5"), &grabbed), "half a stop is seen");
+}
+
+#[test]
+fn nothing_done_at_random_leaves_a_trace() {
+    let Some(screen_server) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut view = View::open(&screen_server, folder.path(), &format!("{SMALL} --spp 2 --set smoothing=false"));
+    let save = |view: &mut View<'_>, number: u32| {
+        view.settle();
+        view.xdotool("key F5");
+        let written = folder.path().join(format!("shot-{number:03}.state"));
+        view.wait("state", |_| written.exists());
+        std::fs::read_to_string(written).unwrap()
+    };
+    // Twice through all methods, so that whatever is made once is there.
+    for _ in 0..2 {
+        for _ in 0..6 {
+            view.key("Next");
+        }
+    }
+    let before = save(&mut view, 1);
+    let actions: usize = std::env::var("LINKLIGHT_ACTIONS").as_deref().unwrap_or(ACTIONS).parse().unwrap();
+    let mut random = Random(7);
+    let (mut methods, mut hidden) = (0, true);
+    for _ in 0..actions {
+        let (x, y) = (20 + random.below(100), 20 + random.below(60));
+        let window = view.window.clone();
+        match random.below(9) {
+            0 => {
+                view.xdotool("key Next");
+                methods += 1;
+            }
+            1 => {
+                view.xdotool("key Prior");
+                methods += 5;
+            }
+            2 => view.xdotool(&format!("windowsize {window} {} {}", 100 + x, 50 + y)),
+            3 => {
+                view.xdotool("key Tab");
+                hidden = !hidden;
+            }
+            4 => view.xdotool("key ctrl+l"),
+            5 => view.xdotool("key Escape"),
+            6 => view.xdotool(&format!("windowunmap {window} windowmap {window} windowfocus {window}")),
+            7 => view.xdotool(&format!("mousemove {x} {y} click 4")),
+            _ => view.xdotool(&format!(
+                "mousemove {x} {y} mousedown 1 mousemove {} {y} mousemove {y} {x} mouseup 1",
+                x + random.below(30)
+            )),
+        }
+        std::thread::sleep(Duration::from_millis(random.below(200) as u64));
+    }
+    // Back to where it began. What Escape cancelled is asked for again by the changes.
+    let window = view.window.clone();
+    view.xdotool(&format!("windowsize --sync {window} 150 110 windowfocus {window}"));
+    if !hidden {
+        view.xdotool("key Tab");
+    }
+    for _ in 0..(6 - methods % 6) {
+        view.key("Next");
+    }
+    view.xdotool(&format!("windowsize --sync {window} 160 120"));
+    let after = save(&mut view, 2);
+    let option = |state: &str, name: &str| {
+        state.lines().find(|line| line.starts_with(name)).map(str::to_owned).unwrap_or_default()
+    };
+    for name in ["--method=", "--size=", "--bounces=", "--set="] {
+        assert_eq!(option(&after, name), option(&before, name));
+    }
+    let name = view.shoot(3);
+    let said = view.close();
+    let counts = counts(&said);
+    let ([_, pipelines, bytes], [frames, later_pipelines, later_bytes]) = (counts[0], counts[1]);
+    assert_eq!(later_pipelines, pipelines, "no pipeline is made once all were");
+    let grown = later_bytes as f64 / bytes as f64;
+    assert!(grown < 1.05, "memory grew from {bytes} to {later_bytes} bytes in {frames} frames");
+    assert_eq!(rgb(&name.with_extension("png")), rgb(&headless(&name, "")));
 }

@@ -9,6 +9,7 @@ use glam::Vec3;
 use super::compare::Variation;
 use super::console::Verbosity;
 use super::diff::Limit;
+use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
     parse_glb, parse_measuring_seconds, parse_method, parse_place, parse_scale, parse_size, parse_turn,
@@ -153,6 +154,10 @@ pub struct PictureArgs {
     /// A setting of the method or of the display, see `linklight methods`; may be repeated
     #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
     pub set: Vec<Assignment>,
+    /// Change the scene, such as material:3.albedo=0.8,0.2,0.1; material: albedo, roughness, metallic, emission; light:
+    /// intensity; node: move (metres); may be repeated
+    #[arg(long, value_name = "KIND:N.PROPERTY=VALUE", allow_hyphen_values = true)]
+    pub edit: Vec<Edit>,
 }
 
 #[derive(Debug, Args)]
@@ -194,6 +199,9 @@ pub struct ViewArgs {
     /// Start with the panels hidden: the picture fills the window
     #[arg(long)]
     pub bare: bool,
+    /// Watch this folder of shaders, a checkout's glsl, and take what changes; errors are shown over the picture
+    #[arg(long, value_name = "DIR")]
+    pub shaders: Option<PathBuf>,
 }
 
 /// Display stages.

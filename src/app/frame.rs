@@ -202,6 +202,15 @@ impl Method {
         })
     }
 
+    /// Takes over albedo and intensities that changed, without new links; false where all must be prepared anew.
+    pub fn relight(&self, context: &Context, stage: &Stage) -> Result<bool, AppError> {
+        match self {
+            Self::PathTracing(_) => Ok(true),
+            Self::OnElements(shown) => shown.method.relight(context, &stage.world).map(|()| true),
+            Self::OnTexels(_) | Self::FaceClusters(_) => Ok(false),
+        }
+    }
+
     /// Takes over what `request` changed of the picture alone: its size, its display and what that was told. The
     /// solution stays.
     pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {

@@ -21,6 +21,7 @@ pub mod compare;
 pub mod console;
 pub mod devices;
 pub mod diff;
+pub mod edits;
 mod error;
 mod frame;
 pub mod interrupt;

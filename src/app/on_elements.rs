@@ -17,6 +17,8 @@ use serde_json::Value;
 pub trait OnElements {
     /// The light of direct illumination and `bounces` more, with all that has to be made anew for a frame.
     fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError>;
+    /// Takes over albedo and intensities that changed, without new links.
+    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError>;
     fn elements(&self) -> &Elements;
     /// What was made for it, in numbers: the method's report.
     fn facts(&self) -> serde_json::Result<Value>;
@@ -51,6 +53,12 @@ impl OnElements for ExplicitVisibility {
         Ok(recorder.submit()?)
     }
 
+    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
+        let mut recorder = context.recorder("relight")?;
+        self.update_materials(&mut recorder, world);
+        Ok(recorder.submit()?)
+    }
+
     fn elements(&self) -> &Elements {
         Self::elements(self)
     }
@@ -78,6 +86,12 @@ impl OnElements for ImplicitVisibility {
         tracing::info!("{}", self.report());
         let mut recorder = context.recorder("frame")?;
         recorder.scope("implicit-visibility", |recorder| Self::solve(self, recorder, stage.world, bounces));
+        Ok(recorder.submit()?)
+    }
+
+    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
+        let mut recorder = context.recorder("relight")?;
+        self.update_materials(&mut recorder, world);
         Ok(recorder.submit()?)
     }
 
@@ -134,6 +148,12 @@ impl OnElements for Antiradiance {
             tracing::info!("{} steps, the last changed {:.2} % of the light", last.step, 100.0 * last.relative());
         }
         Ok(())
+    }
+
+    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
+        let mut recorder = context.recorder("relight")?;
+        self.update_materials(&mut recorder, world);
+        Ok(recorder.submit()?)
     }
 
     fn elements(&self) -> &Elements {

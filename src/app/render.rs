@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::cli::{Channel, Display, Global, PictureArgs, Rays, RenderArgs};
 use super::console::{Console, Verbosity, Watcher};
+use super::edits::Edit;
 use super::interrupt::Interrupt;
 use super::output::Measured;
 use super::stage::Stage;
@@ -63,6 +64,8 @@ pub struct RenderRequest {
     pub tone: ToneSettings,
     pub rays: Rays,
     pub seed: u32,
+    /// Changes of the scene.
+    pub edits: Vec<Edit>,
     /// Checked: [`RenderRequest::settings`] of the method's own type succeeds.
     pub assignments: Vec<Assignment>,
     /// Those of the display stage, checked.
@@ -208,6 +211,7 @@ impl RenderRequest {
             tone: ToneSettings { operator: args.tonemap, exposure: args.exposure, ..ToneSettings::default() },
             rays: args.rays,
             seed: args.seed,
+            edits: args.edit.clone(),
             assignments: of_method,
             display_assignments: of_display,
             channels: Vec::new(),
@@ -252,6 +256,9 @@ impl RenderRequest {
         }
         if self.environment_turn != 0.0 {
             insert("environment_turn", self.environment_turn.to_json());
+        }
+        if !self.edits.is_empty() {
+            insert("edits", json!(self.edits.iter().map(Edit::to_string).collect::<Vec<_>>()));
         }
         insert("diffuse", self.diffuse.into());
         insert("light", self.light.name().into());

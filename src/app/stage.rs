@@ -2,10 +2,10 @@
 
 use glam::{UVec2, Vec3};
 
-use super::AppError;
 use super::cli::Rays;
 use super::render::{FreeCamera, RenderRequest};
 use super::values::SceneSource;
+use super::{AppError, edits};
 use crate::gpu::{AccelerationStructure, Context};
 use crate::report::profile::SceneFacts;
 use crate::report::trace::TimeLine;
@@ -48,10 +48,21 @@ impl Stage {
     /// Loads and places what `request` asks for. What was skipped or repaired on the way is logged.
     pub fn new(context: &Context, request: &RenderRequest, time_line: &TimeLine) -> Result<Self, AppError> {
         let scene = time_line.span("load scene", || load_scene(&request.scene))?;
+        let mut scene = scene;
+        request.edits.iter().try_for_each(|edit| edits::apply(&mut scene, edit))?;
         Self::place(context, scene, request, time_line)
     }
 
-    /// Places a scene that was loaded before.
+    /// Takes over materials and lights of the scene, whose surfaces stand where they did.
+    pub fn relight(&mut self, context: &Context, request: &RenderRequest) -> Result<(), AppError> {
+        self.pose = Pose::at(&self.scene, request.seconds);
+        let mut recorder = context.recorder("world")?;
+        self.world.update_materials(&mut recorder, &self.scene, request.diffuse);
+        self.world.pose(&mut recorder, &self.pose);
+        Ok(recorder.submit()?)
+    }
+
+    /// Places a scene that was loaded, and edited, before.
     pub fn place(
         context: &Context,
         scene: Scene,

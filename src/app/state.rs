@@ -110,6 +110,9 @@ pub fn options(args: &PictureArgs) -> Vec<String> {
     for set in &args.set {
         option("set", format!("{}={}", set.key, set.value));
     }
+    for edit in &args.edit {
+        option("edit", edit.to_string());
+    }
     let switches =
         [("diffuse", args.diffuse), ("direct-only", args.direct_only), ("indirect-only", args.indirect_only)];
     options.extend(switches.iter().filter(|(_, on)| *on).map(|(name, _)| format!("--{name}")));
@@ -155,7 +158,7 @@ mod tests {
              --camera 2 --env 0.1,0,2 --env-turn -30.5 --diffuse --elements 77 --exposure -1.25 --tonemap filmic \
              --rays compute --seed 5 --set emitter-sampling=area",
             "linklight view a.gltf --display final-gather --eye -1.1,2,3e-3 --look-at 0,1.7,-4 --fov 33.3 \
-             --env sky.hdr --indirect-only --set rays_per_element=64 --set gather_visibility=rays",
+             --env sky.hdr --indirect-only --edit material:0.albedo=0.5 --edit node:1.move=-1,0,0.125 --set rays_per_element=64 --set gather_visibility=rays",
         ] {
             let args = picture(words(line)).unwrap();
             write(&file, &args).unwrap();

@@ -2,7 +2,7 @@
 
 use super::settings::{Kind, SettingValue};
 use crate::scene::camera::View;
-use glam::{UVec2, UVec3, Vec2, Vec3};
+use glam::{UVec2, UVec3, Vec3};
 use serde_json::Value;
 use std::ops::RangeInclusive;
 
@@ -59,13 +59,38 @@ pub fn picked_element(
         Pick::Element(element) => return Some(element),
         Pick::Pixel { x, y } => (x, y),
     };
-    let ray = view.ray(Vec2::new(x as f32 + 0.5, y as f32 + 0.5), size);
-    let mut nearest: Option<(f32, u32)> = None;
-    for triangle in triangles {
+    let seen = seen_triangle(positions, triangles, view, UVec2::new(x, y), size)?;
+    let vertex = triangles[seen.triangle].to_array()[seen.corner];
+    let back = back_elements.get(vertex as usize).copied().filter(|&back| back != u32::MAX);
+    Some(back.filter(|_| seen.is_back).unwrap_or(vertex))
+}
+
+/// A triangle as a pixel sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SeenTriangle {
+    pub triangle: usize,
+    /// The nearest of its corners, 0..=2.
+    pub corner: usize,
+    pub is_back: bool,
+    /// Metres along the pixel's ray.
+    pub distance: f32,
+}
+
+/// The nearest triangle through the middle of `pixel`.
+pub fn seen_triangle(
+    positions: &[Vec3],
+    triangles: &[UVec3],
+    view: &View,
+    pixel: UVec2,
+    size: UVec2,
+) -> Option<SeenTriangle> {
+    let ray = view.ray(pixel.as_vec2() + 0.5, size);
+    let mut nearest: Option<SeenTriangle> = None;
+    for (index, triangle) in triangles.iter().enumerate() {
         let [a, b, c] = triangle.to_array().map(|v| positions[v as usize]);
         let across = (b - a).cross(c - a);
         let t = across.dot(a - ray.origin) / across.dot(ray.direction);
-        if !(t > ray.t_min && t < nearest.map_or(ray.t_max, |(t, _)| t)) {
+        if !(t > ray.t_min && t < nearest.map_or(ray.t_max, |seen| seen.distance)) {
             continue;
         }
         // Shares of the area across from each corner: all of one sign inside.
@@ -73,19 +98,18 @@ pub fn picked_element(
         let shares = [(b, c), (c, a), (a, b)].map(|(p, q)| (p - at).cross(q - at).dot(across));
         if shares.iter().all(|&share| share >= 0.0) {
             let corner = (0..3).reduce(|best, k| if shares[k] > shares[best] { k } else { best }).unwrap_or(0);
-            let vertex = triangle.to_array()[corner];
-            let back = back_elements.get(vertex as usize).copied().filter(|&back| back != u32::MAX);
             let is_back = across.dot(ray.direction) > 0.0;
-            nearest = Some((t, back.filter(|_| is_back).unwrap_or(vertex)));
+            nearest = Some(SeenTriangle { triangle: index, corner, is_back, distance: t });
         }
     }
-    nearest.map(|(_, element)| element)
+    nearest
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::camera::Lens;
+    use glam::Vec2;
 
     #[test]
     fn picks_read_as_they_are_recorded() {

@@ -118,6 +118,12 @@ impl World {
         Ok(world)
     }
 
+    /// Takes over the scene's present materials; which of them have holes stays.
+    pub fn update_materials(&self, recorder: &mut Recorder<'_>, scene: &Scene, diffuse: bool) {
+        let materials: Vec<Material> = scene.materials.iter().map(|m| material(m, diffuse)).collect();
+        recorder.write(&self.materials, 0, &materials);
+    }
+
     /// Moves everything to `pose`, which comes from the same scene: transforms and lights are written, vertices
     /// computed.
     pub fn pose(&self, recorder: &mut Recorder<'_>, pose: &Pose) {

@@ -3,7 +3,7 @@
 mod against;
 mod rounds;
 mod subject;
-mod yardsticks;
+pub(in crate::app) mod yardsticks;
 
 use std::io::Write;
 use std::time::Instant;

@@ -4,7 +4,7 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::engine::{Depth, Engine, change};
+use super::engine::{Depth, Engine, Picked, change};
 use crate::app::AppError;
 use crate::app::frame::SAMPLING_TASKS;
 use crate::app::render::RenderRequest;
@@ -12,6 +12,7 @@ use crate::report::profile::SceneFacts;
 use crate::scene::camera::View;
 use crate::stages::film::Film;
 use crate::stages::work::{Interrupted, Watch};
+use glam::UVec2;
 
 /// How often progress is told.
 const PROGRESS_INTERVAL: Duration = Duration::from_millis(50);
@@ -22,6 +23,8 @@ pub struct Job {
     pub request: RenderRequest,
     /// One sample a pixel, and not to be left half-way: the picture while something moves.
     pub is_preview: bool,
+    /// Prepared anew even where nothing changed: a shader did.
+    pub is_anew: bool,
 }
 
 /// A picture that is there.
@@ -36,6 +39,8 @@ pub struct Shown {
     pub duration: f32,
     /// Of the scene's cameras.
     pub cameras: Vec<String>,
+    /// Names and intensities of the scene's lights, as edited.
+    pub lights: Vec<(String, glam::Vec3)>,
     /// From request to film.
     pub milliseconds: f64,
 }
@@ -56,6 +61,10 @@ pub struct News {
     pub failure: Option<String>,
     pub progress: Option<Progress>,
     pub is_working: bool,
+    /// What was clicked at; the inner `None` is the background.
+    pub picked: Option<Option<Picked>>,
+    /// What a copy moves, bytes a millisecond, once it was asked for.
+    pub bandwidth: Option<f64>,
     /// The GPU is gone: nothing more will come.
     pub end: Option<AppError>,
 }
@@ -63,9 +72,19 @@ pub struct News {
 #[derive(Default)]
 struct Papers {
     job: Option<Job>,
+    /// A pixel that was clicked at.
+    pick: Option<UVec2>,
+    wants_bandwidth: bool,
     news: News,
     is_cancelled: bool,
     is_closing: bool,
+}
+
+/// One thing for the renderer to do.
+enum Order {
+    Picture(Box<Job>),
+    Pick(UVec2),
+    Bandwidth,
 }
 
 /// Shared by the two threads.
@@ -92,6 +111,18 @@ impl Desk {
         self.wake.notify_all();
     }
 
+    /// Asks what a pixel of the last picture shows.
+    pub fn pick(&self, pixel: UVec2) {
+        self.lock().pick = Some(pixel);
+        self.wake.notify_all();
+    }
+
+    /// Asks what a copy moves on this device.
+    pub fn measure_bandwidth(&self) {
+        self.lock().wants_bandwidth = true;
+        self.wake.notify_all();
+    }
+
     /// Ends the work that is being done, without a picture.
     pub fn cancel(&self) {
         let mut papers = self.lock();
@@ -114,6 +145,8 @@ impl Desk {
             failure: news.failure.clone(),
             progress: news.progress.clone(),
             is_working: news.is_working,
+            picked: news.picked.take(),
+            bandwidth: news.bandwidth.take(),
             end: news.end.take(),
         }
     }
@@ -126,9 +159,24 @@ impl Desk {
 
     /// Renders what is asked for until closed.
     pub fn work(&self, mut engine: Engine<'_>) {
-        while let Some(job) = self.next() {
+        while let Some(order) = self.next() {
+            let job = match order {
+                Order::Picture(job) => *job,
+                Order::Pick(pixel) => {
+                    self.answer(engine.pick(pixel), engine.is_lost(), |news, picked| news.picked = Some(picked));
+                    continue;
+                }
+                Order::Bandwidth => {
+                    let measured = engine.measure_bandwidth();
+                    self.answer(measured, engine.is_lost(), |news, bandwidth| news.bandwidth = Some(bandwidth));
+                    continue;
+                }
+            };
             let start = Instant::now();
             let watch = DeskWatch { desk: self, job: &job, told: Mutex::new(start) };
+            if job.is_anew {
+                engine.prepare_anew();
+            }
             let result = engine.render(&job.request, &watch);
             let mut papers = self.lock();
             papers.news.progress = None;
@@ -141,6 +189,7 @@ impl Desk {
                         bounds: stage.bounds,
                         facts: stage.facts(),
                         duration: stage.scene.clips.iter().map(|clip| clip.duration).fold(0.0, f32::max),
+                        lights: stage.scene.lights.iter().map(|light| (light.name.clone(), light.intensity)).collect(),
                         cameras: stage.scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
                         milliseconds: start.elapsed().as_secs_f64() * 1e3,
                         job,
@@ -157,14 +206,32 @@ impl Desk {
         }
     }
 
-    fn next(&self) -> Option<Job> {
+    /// Puts what a small order brought, or its error, into the news.
+    fn answer<T>(&self, result: Result<T, AppError>, is_lost: bool, put: impl FnOnce(&mut News, T)) {
+        let mut papers = self.lock();
+        match result {
+            Ok(value) => put(&mut papers.news, value),
+            Err(error) if is_lost => papers.news.end = Some(error),
+            Err(error) => papers.news.failure = Some(error.to_string()),
+        }
+        drop(papers);
+        (self.tell)();
+    }
+
+    fn next(&self) -> Option<Order> {
         let mut papers = self.lock();
         loop {
             if papers.is_closing {
                 return None;
             }
             if let Some(job) = papers.job.take() {
-                return Some(job);
+                return Some(Order::Picture(Box::new(job)));
+            }
+            if let Some(pixel) = papers.pick.take() {
+                return Some(Order::Pick(pixel));
+            }
+            if std::mem::take(&mut papers.wants_bandwidth) {
+                return Some(Order::Bandwidth);
             }
             papers = self.wake.wait(papers).unwrap_or_else(PoisonError::into_inner);
         }

@@ -4,20 +4,27 @@
 use std::sync::Arc;
 
 use crate::app::AppError;
+use crate::app::bench::yardsticks::Yardsticks;
+use crate::app::edits::{Edit, Originals};
 use crate::app::frame::Method;
 use crate::app::render::RenderRequest;
 use crate::app::stage::{Stage, load_scene};
 use crate::gpu::Context;
+use crate::methods::pick::seen_triangle;
 use crate::report::trace::TimeLine;
-use crate::scene::Scene;
+use crate::scene::pose::PosedLight;
+use crate::scene::{LightKind, Material, Scene};
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
+use glam::UVec2;
 
 /// How deep a change of the request goes; each needs what stands after it too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Depth {
     /// The view, or what a frame solves.
     Frame,
+    /// Albedo and intensities.
+    Light,
     /// What the display stage keeps: buffers of the picture's size.
     Display,
     /// What the method prepares: links, maps, clusters.
@@ -41,6 +48,7 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
         || old.rays != new.rays
         || old.seconds != new.seconds
         || tessellates(old) != tessellates(new)
+        || (old.edits != new.edits && !keeps_links(&old.edits, &new.edits))
     {
         Some(Depth::Stage)
     } else if old.method.key != new.method.key || old.assignments != new.assignments || old.seed != new.seed {
@@ -53,6 +61,8 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
         || (is_traced && old.bounces != new.bounces)
     {
         Some(Depth::Display)
+    } else if old.edits != new.edits {
+        Some(Depth::Light)
     } else if old.camera != new.camera
         || old.free_camera != new.free_camera
         || old.bounces != new.bounces
@@ -64,9 +74,37 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
     }
 }
 
+/// Whether the edits that are not in both lists leave links as they are.
+fn keeps_links(old: &[Edit], new: &[Edit]) -> bool {
+    let changed = |a: &[Edit], b: &[Edit]| a.iter().filter(|edit| !b.contains(edit)).all(|e| e.property.keeps_links());
+    changed(old, new) && changed(new, old)
+}
+
 /// Whether the film itself depends on the tone map.
 fn shows_by_tone(request: &RenderRequest) -> bool {
     request.display == Some(crate::app::cli::Display::FinalGather)
+}
+
+/// How far from a light's place a click still means the light, pixels.
+const LIGHT_REACH: f32 = 8.0;
+const YARDSTICK_ROUNDS: usize = 5;
+
+/// What was clicked at.
+pub enum Picked {
+    /// Index in the scene's lights.
+    Light(u32),
+    Surface(Box<Surface>),
+}
+
+/// A surface of the scene as it is edited now.
+pub struct Surface {
+    pub material_index: u32,
+    pub material: Material,
+    pub node_index: u32,
+    pub node: String,
+    pub triangle: usize,
+    /// Metres from the eye.
+    pub distance: f32,
 }
 
 /// A scene on the device with a method prepared, and the films it renders into.
@@ -74,6 +112,10 @@ pub struct Engine<'c> {
     context: &'c Context,
     time_line: TimeLine,
     scene: Option<Scene>,
+    /// What the file says where edits change it.
+    originals: Option<Originals>,
+    /// Those that stage and method have taken over.
+    edits: Vec<Edit>,
     stage: Option<Stage>,
     method: Option<Method>,
     /// What scene, stage and method were made for.
@@ -90,6 +132,8 @@ impl<'c> Engine<'c> {
             context,
             time_line,
             scene: None,
+            originals: None,
+            edits: Vec::new(),
             stage: None,
             method: None,
             last: None,
@@ -127,14 +171,33 @@ impl<'c> Engine<'c> {
 
         if depth >= Depth::Stage {
             watch.step("placing the scene", 0, 1)?;
-            let scene = match self.scene.take() {
+            let mut scene = match self.scene.take() {
                 Some(scene) => scene,
-                None => load_scene(&request.scene)?,
+                None => {
+                    let scene = load_scene(&request.scene)?;
+                    self.originals = Some(Originals::of(&scene));
+                    scene
+                }
             };
+            if let Some(originals) = &self.originals {
+                originals.edit(&mut scene, &request.edits)?;
+            }
             self.stage = Some(Stage::place(self.context, scene, request, &self.time_line)?);
         }
         let film = self.film(request.width, request.height)?;
         let Some(stage) = &mut self.stage else { return Err(AppError::failed("the scene was not placed")) };
+        if self.edits != request.edits && depth < Depth::Stage {
+            if let Some(originals) = &self.originals {
+                originals.edit(&mut stage.scene, &request.edits)?;
+            }
+            stage.relight(self.context, request)?;
+            if let Some(method) = &self.method
+                && !method.relight(self.context, stage)?
+            {
+                self.method = None;
+            }
+        }
+        self.edits.clone_from(&request.edits);
         stage.look(request)?;
         match &mut self.method {
             Some(method) if depth >= Depth::Display => method.show(self.context, request, stage)?,
@@ -150,6 +213,49 @@ impl<'c> Engine<'c> {
         Ok(film)
     }
 
+    /// The method is prepared again for the next picture.
+    pub fn prepare_anew(&mut self) {
+        self.owed = self.owed.max(Depth::Method);
+    }
+
+    /// What the pixel of the last frame shows: a light close by, else the nearest surface.
+    pub fn pick(&self, pixel: UVec2) -> Result<Option<Picked>, AppError> {
+        let (Some(stage), Some(request)) = (&self.stage, &self.last) else { return Ok(None) };
+        let size = UVec2::new(request.width, request.height);
+        let near_pixel = |light: &&PosedLight| {
+            let at = stage.view.project(light.position, size);
+            light.kind != LightKind::Directional && at.is_some_and(|(at, _)| at.distance(pixel.as_vec2()) < LIGHT_REACH)
+        };
+        if let Some(light) = stage.pose.lights.iter().find(near_pixel) {
+            return Ok(Some(Picked::Light(light.light)));
+        }
+        let positions = self.context.download(&stage.world.positions)?;
+        let triangles = self.context.download(&stage.world.triangles)?;
+        let Some(seen) = seen_triangle(&positions, &triangles, &stage.view, pixel, size) else { return Ok(None) };
+        let part = &stage.geometry.parts[stage.geometry.triangle_part[seen.triangle] as usize];
+        let material = stage.scene.materials[part.material as usize].clone();
+        let node = stage.scene.nodes[part.node as usize].name.clone();
+        Ok(Some(Picked::Surface(Box::new(Surface {
+            material_index: part.material,
+            material,
+            node_index: part.node,
+            node,
+            triangle: seen.triangle,
+            distance: seen.distance,
+        }))))
+    }
+
+    /// What a copy moves on this device, bytes a millisecond.
+    pub fn measure_bandwidth(&self) -> Result<f64, AppError> {
+        let mut yardsticks = Yardsticks::new(self.context)?;
+        for _ in 0..YARDSTICK_ROUNDS {
+            yardsticks.round(self.context, true)?;
+        }
+        let mut measured = yardsticks.finish();
+        measured.copy_ms.sort_by(f64::total_cmp);
+        Ok(measured.copy_bytes as f64 / measured.copy_ms[YARDSTICK_ROUNDS / 2].max(1e-6))
+    }
+
     /// A film of that size that nobody looks at.
     fn film(&mut self, width: u32, height: u32) -> Result<Arc<Film>, AppError> {
         self.films.retain(|film| (film.width, film.height) == (width, height));
@@ -161,3 +267,7 @@ impl<'c> Engine<'c> {
         Ok(film)
     }
 }
+
+#[cfg(test)]
+#[path = "engine_tests.rs"]
+mod tests;

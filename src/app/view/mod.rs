@@ -8,14 +8,18 @@
 //! | [`viewer`] | what the user did: the state that decides the picture |
 //! | [`panel`] | the panel beside the picture |
 //! | [`settings`] | a widget for every setting, from its declaration |
+//! | [`editor`] | materials, lights and places, changed |
+//! | [`profiler`] | what the passes cost |
 //! | [`camera`] | orbit and fly |
 //!
 //! The window's thread only ever draws the last film and the interface, so link generation never stops it.
 
 mod camera;
 mod desk;
+mod editor;
 mod engine;
 mod panel;
+mod profiler;
 mod settings;
 mod viewer;
 mod window;
@@ -27,7 +31,7 @@ use winit::event_loop::EventLoop;
 use super::AppError;
 use super::cli::{Global, ViewArgs};
 use super::render::{check_validation, pipeline_cache};
-use crate::gpu::{Context, Options};
+use crate::gpu::{Context, Options, ShaderWatcher};
 use desk::Desk;
 use engine::Engine;
 use viewer::Viewer;
@@ -47,6 +51,7 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
         return Err(AppError::Usage(format!("--shots {} is no folder; make it first", args.shots.display())));
     }
     let viewer = Viewer::new(args)?;
+    let shaders = args.shaders.as_deref().map(ShaderWatcher::new).transpose().map_err(AppError::Usage)?;
     let no_window = |error: winit::error::EventLoopError| {
         AppError::failed(format!("no window can be opened ({error}); `linklight render` needs none"))
     };
@@ -72,7 +77,7 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
         renderer.spawn_scoped(scope, || desk.work(Engine::new(&context)))?;
         // However this ends, the renderer is not left waiting.
         let _closing = Closing(&desk);
-        let mut window = ViewWindow::new(&context, &desk, viewer);
+        let mut window = ViewWindow::new(&context, &desk, viewer, shaders);
         let result = event_loop.run_app(&mut window).map_err(no_window);
         window.finish().and(result)
     });

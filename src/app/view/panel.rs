@@ -4,8 +4,8 @@ use egui::{Button, CollapsingHeader, Color32, ComboBox, DragValue, ProgressBar, 
 
 use super::camera::CameraMode;
 use super::desk::Desk;
-use super::settings;
 use super::viewer::Viewer;
+use super::{editor, settings};
 use crate::app::cli::Display;
 use crate::app::render::displays;
 use crate::app::state::name;
@@ -28,6 +28,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         camera(ui, viewer);
         animation(ui, viewer);
         ui.separator();
+        scene(ui, viewer);
         let specs = viewer.args.method.specs();
         CollapsingHeader::new(format!("Settings of {}", viewer.args.method.key))
             .default_open(true)
@@ -40,6 +41,23 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
     });
 }
 
+/// What was clicked at, and the lights.
+fn scene(ui: &mut Ui, viewer: &mut Viewer) {
+    let lights = viewer.shown.as_ref().map(|shown| shown.lights.clone()).unwrap_or_default();
+    match &viewer.picked {
+        Some(picked) => editor::picked(ui, picked, &lights, &mut viewer.args.edit),
+        None => {
+            ui.weak("click at a surface or a light to change it");
+        }
+    }
+    editor::lights(ui, &lights, &mut viewer.args.edit);
+    if !viewer.args.edit.is_empty() && ui.button("Undo all changes").clicked() {
+        viewer.args.edit.clear();
+        viewer.picked = None;
+    }
+    ui.separator();
+}
+
 /// Progress, errors, and what to do about them.
 fn work(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
     ui.horizontal(|ui| {
@@ -48,6 +66,9 @@ fn work(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         }
         if ui.button("Save state").on_hover_text("F5: a file for --state").clicked() {
             viewer.wants_state = true;
+        }
+        if ui.button("Profile").on_hover_text("P: times of all passes").clicked() {
+            viewer.toggle_profile(desk);
         }
         let is_working = viewer.news.is_working;
         if ui.add_enabled(is_working, Button::new("Cancel")).on_hover_text("Escape").clicked() {

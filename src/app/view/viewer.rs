@@ -1,22 +1,23 @@
 //! What the user did: the options that decide the picture, the camera, what is shown and what was asked for.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use egui::{CentralPanel, Key, PointerButton, Sense, Ui};
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 
 use super::camera::{self, CameraMode};
 use super::desk::{Desk, Job, News, Shown};
-use super::engine::change;
+use super::engine::{Picked, change};
 use super::panel;
+use super::profiler::Profiler;
 use crate::app::cli::{Display, PictureArgs, ViewArgs};
 use crate::app::render::{FreeCamera, RenderRequest};
 use crate::app::values::{Format, Output};
 use crate::app::{AppError, frame, output, state};
 use crate::display::tone_map::LightParts;
-use crate::gpu::{Context, PassRecord};
+use crate::gpu::{Context, MemoryUse, PassRecord, Reload};
 use crate::methods::settings::Assignment;
 use crate::methods::{METHODS, Method};
 use crate::report::image::{MAX_PIXELS, MAX_SIDE};
@@ -47,6 +48,15 @@ pub struct Viewer {
     pub wants_to_quit: bool,
     /// The window's surface is to be made anew.
     pub wants_new_surface: bool,
+    /// What was clicked at.
+    pub picked: Option<Picked>,
+    pub memory: BTreeMap<String, MemoryUse>,
+    profiler: Profiler,
+    shows_profile: bool,
+    /// Shaders that do not compile, by file, with the compiler's words; the last good ones stay.
+    shader_errors: BTreeMap<&'static str, String>,
+    /// A shader changed: the next picture is prepared anew.
+    is_anew: bool,
     is_bare: bool,
     /// The mouse or a key moves the camera.
     is_steering: bool,
@@ -85,6 +95,12 @@ impl Viewer {
             wants_state: false,
             wants_to_quit: false,
             wants_new_surface: false,
+            picked: None,
+            memory: BTreeMap::new(),
+            profiler: Profiler::default(),
+            shows_profile: false,
+            shader_errors: BTreeMap::new(),
+            is_anew: false,
             is_bare: args.bare,
             is_steering: false,
             posted: None,
@@ -123,13 +139,42 @@ impl Viewer {
             return Err(end);
         }
         if let Some(shown) = self.news.shown.take() {
+            self.profiler.finish_frame(shown.milliseconds);
             self.shown = Some(shown);
         }
+        if let Some(picked) = self.news.picked.take() {
+            self.picked = picked;
+        }
+        self.profiler.bandwidth = self.news.bandwidth.take().or(self.profiler.bandwidth);
         Ok(())
     }
 
+    /// Shaders that were compiled anew, or would not.
+    pub fn take_reloads(&mut self, reloads: &[Reload]) {
+        for reload in reloads {
+            match &reload.result {
+                Ok(()) => {
+                    self.shader_errors.remove(reload.file);
+                    self.is_anew = true;
+                    self.ask_again();
+                }
+                Err(error) => {
+                    self.shader_errors.insert(reload.file, error.clone());
+                }
+            }
+        }
+    }
+
+    pub fn toggle_profile(&mut self, desk: &Desk) {
+        self.shows_profile = !self.shows_profile;
+        if self.shows_profile && self.profiler.bandwidth.is_none() {
+            desk.measure_bandwidth();
+        }
+    }
+
     /// A frame of the window was drawn.
-    pub fn take_records(&mut self, _: Vec<PassRecord>) {
+    pub fn take_records(&mut self, records: Vec<PassRecord>) {
+        self.profiler.take(records);
         self.frame_count += 1;
     }
 
@@ -153,7 +198,21 @@ impl Viewer {
             let side = egui::Panel::left("controls").resizable(false).exact_size(PANEL_WIDTH);
             side.show(ui, |ui| panel::show(ui, self, desk));
         }
-        CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.steer(ui));
+        CentralPanel::default().frame(egui::Frame::NONE).show(ui, |ui| self.steer(ui, desk));
+        if self.shows_profile {
+            let window = egui::Window::new("Profile").default_width(560.0).default_pos([PANEL_WIDTH + 20.0, 20.0]);
+            window.show(ui.ctx(), |ui| self.profiler.show(ui, &self.memory));
+        }
+        if !self.shader_errors.is_empty() {
+            egui::Window::new("Shaders kept as they were").default_pos([PANEL_WIDTH + 20.0, 40.0]).show(
+                ui.ctx(),
+                |ui| {
+                    for error in self.shader_errors.values() {
+                        ui.colored_label(egui::Color32::LIGHT_RED, egui::RichText::new(error).monospace());
+                    }
+                },
+            );
+        }
         if self.is_playing && !self.news.is_working {
             let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
             self.step_animation(step, duration);
@@ -241,6 +300,9 @@ impl Viewer {
         if pressed(Key::F5) {
             self.wants_state = true;
         }
+        if pressed(Key::P) {
+            self.toggle_profile(desk);
+        }
         if pressed(Key::Escape) {
             desk.cancel();
         }
@@ -280,7 +342,7 @@ impl Viewer {
     }
 
     /// The picture's place, and the mouse over it.
-    fn steer(&mut self, ui: &mut Ui) {
+    fn steer(&mut self, ui: &mut Ui, desk: &Desk) {
         let rect = ui.max_rect();
         let scale = ui.ctx().pixels_per_point();
         let pixels = |points: f32| (points * scale).round().max(0.0) as u32;
@@ -299,6 +361,10 @@ impl Viewer {
         let (mode, rows) = (self.camera_mode, height as f32);
         if response.dragged() {
             self.is_steering = true;
+        }
+        if let (true, Some(at)) = (response.clicked(), response.interact_pointer_pos()) {
+            let [left, top] = self.corner;
+            desk.pick(UVec2::new(pixels(at.x).saturating_sub(left), pixels(at.y).saturating_sub(top)));
         }
         if response.dragged_by(PointerButton::Primary) && dragged != Vec2::ZERO {
             self.move_camera(|camera| camera::turn(camera, mode, dragged));
@@ -336,7 +402,7 @@ impl Viewer {
                 }
                 let same = |asked: &Job| asked.is_preview == is_preview && change(&asked.request, &request).is_none();
                 if !self.asked.as_ref().is_some_and(same) {
-                    let job = Job { request, is_preview };
+                    let job = Job { request, is_preview, is_anew: std::mem::take(&mut self.is_anew) };
                     self.asked = Some(job.clone());
                     self.news.is_working = true;
                     desk.ask(job);

@@ -16,8 +16,10 @@ use super::viewer::Viewer;
 use crate::app::AppError;
 use crate::display::interface::Interface;
 use crate::display::tone_map::ToneMapping;
-use crate::gpu::{Context, Format, Image, ImageDescription, Presenter, Shape, WindowSource};
+use crate::gpu::{Context, Format, Image, ImageDescription, Presenter, ShaderWatcher, Shape, WindowSource};
 
+/// How often changed shaders are looked for.
+const SHADER_INTERVAL: Duration = Duration::from_millis(200);
 /// Behind the picture and where there is none yet; encoded values.
 const BACKGROUND: [f32; 4] = [0.1, 0.1, 0.1, 1.0];
 
@@ -26,6 +28,7 @@ pub struct ViewWindow<'c> {
     context: &'c Context,
     desk: &'c Desk,
     viewer: Viewer,
+    shaders: Option<ShaderWatcher>,
     egui: egui::Context,
     open: Option<Open>,
     error: Option<AppError>,
@@ -46,8 +49,9 @@ struct Open {
 }
 
 impl<'c> ViewWindow<'c> {
-    pub fn new(context: &'c Context, desk: &'c Desk, viewer: Viewer) -> Self {
-        Self { context, desk, viewer, egui: egui::Context::default(), open: None, error: None, next_draw: None }
+    pub fn new(context: &'c Context, desk: &'c Desk, viewer: Viewer, shaders: Option<ShaderWatcher>) -> Self {
+        let egui = egui::Context::default();
+        Self { context, desk, viewer, shaders, egui, open: None, error: None, next_draw: None }
     }
 
     /// How it ended.
@@ -87,6 +91,10 @@ impl<'c> ViewWindow<'c> {
             open.frame = frame_image(self.context, width, height)?;
         }
         self.viewer.take_news(self.desk)?;
+        if let Some(shaders) = &self.shaders {
+            self.viewer.take_reloads(&shaders.poll(self.context));
+        }
+        self.viewer.memory = self.context.memory_by_owner();
         let input = open.input.take_egui_input(&open.window);
         let viewer = &mut self.viewer;
         let mut output = self.egui.run_ui(input, |ui| viewer.interface(ui, self.desk));
@@ -123,6 +131,7 @@ impl<'c> ViewWindow<'c> {
         }
         let wait = output.viewport_output.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |root| root.repaint_delay);
         let wait = if self.viewer.is_moving() { Duration::ZERO } else { wait };
+        let wait = if self.shaders.is_some() { wait.min(SHADER_INTERVAL) } else { wait };
         self.next_draw = Instant::now().checked_add(wait).filter(|_| wait < Duration::from_secs(60));
         Ok(())
     }
