@@ -31,16 +31,19 @@ fn material(ui: &mut Ui, surface: &Surface, edits: &mut Vec<Edit>) {
         let old = value(edits, (Property::Albedo, index), material.base_color.truncate());
         let mut color = old.to_array();
         ui.label("albedo");
-        ui.color_edit_button_rgb(&mut color);
-        put(edits, (Property::Albedo, index), old, Vec3::from_array(color).clamp(Vec3::ZERO, Vec3::ONE));
+        // The widget rounds what it is given, so only what the user did counts.
+        if ui.color_edit_button_rgb(&mut color).changed() {
+            put(edits, (Property::Albedo, index), Vec3::from_array(color).clamp(Vec3::ZERO, Vec3::ONE));
+        }
     });
     for (label, property, now) in
         [("roughness", Property::Roughness, material.roughness), ("metallic", Property::Metallic, material.metallic)]
     {
         let old = value(edits, (property, index), Vec3::splat(now));
         let mut new = old.x;
-        ui.add(Slider::new(&mut new, 0.0..=1.0).text(label));
-        put(edits, (property, index), old, Vec3::splat(new));
+        if ui.add(Slider::new(&mut new, 0.0..=1.0).text(label)).changed() {
+            put(edits, (property, index), Vec3::splat(new));
+        }
     }
     number(ui, edits, "emission", (Property::Emission, index), material.emission);
     number(ui, edits, "move, m", (Property::Move, *node_index), Vec3::ZERO);
@@ -68,9 +71,10 @@ fn number(ui: &mut Ui, edits: &mut Vec<Edit>, label: &str, what: (Property, u32)
         let least = if what.0 == Property::Move { -1e6 } else { 0.0 };
         for axis in 0..3 {
             let widget = DragValue::new(&mut new[axis]).range(least..=1e6).speed(speed);
-            ui.add(widget.max_decimals(3).update_while_editing(false));
+            if ui.add(widget.max_decimals(3).update_while_editing(false)).changed() {
+                put(edits, what, new);
+            }
         }
-        put(edits, what, old, new);
     });
 }
 
@@ -80,9 +84,7 @@ fn value(edits: &[Edit], (property, index): (Property, u32), now: Vec3) -> Vec3 
     edit.map_or(now, |edit| edit.value)
 }
 
-fn put(edits: &mut Vec<Edit>, (property, index): (Property, u32), old: Vec3, value: Vec3) {
-    if value != old {
-        edits.retain(|edit| edit.property != property || edit.index != index);
-        edits.push(Edit { property, index, value });
-    }
+fn put(edits: &mut Vec<Edit>, (property, index): (Property, u32), value: Vec3) {
+    edits.retain(|edit| edit.property != property || edit.index != index);
+    edits.push(Edit { property, index, value });
 }

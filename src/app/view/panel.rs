@@ -74,7 +74,7 @@ fn work(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         if ui.add_enabled(is_working, Button::new("Cancel")).on_hover_text("Escape").clicked() {
             desk.cancel();
         }
-        if viewer.news.failure.is_some() && ui.button("Again").clicked() {
+        if viewer.news.failure.is_some() && ui.button("Again").on_hover_text("R").clicked() {
             viewer.ask_again();
         }
     });

@@ -79,6 +79,7 @@ impl Profiler {
         ));
         self.graph(ui);
         ScrollArea::both().max_height(360.0).auto_shrink(false).show(ui, |ui| {
+            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
             self.show_nodes(ui, &tree(&last.passes));
             CollapsingHeader::new("memory by owner").show(ui, |ui| {
                 for (owner, memory) in memory.iter().filter(|(_, memory)| memory.current_bytes > 0) {

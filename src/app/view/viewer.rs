@@ -191,7 +191,7 @@ impl Viewer {
         let step = self.last_tick.elapsed().min(LONGEST_STEP).as_secs_f32();
         self.last_tick = Instant::now();
         self.is_steering = false;
-        if !ui.ctx().egui_wants_keyboard_input() {
+        if !ui.ctx().text_edit_focused() {
             self.keys(ui, desk, step);
         }
         if !self.is_bare {
@@ -291,7 +291,7 @@ impl Viewer {
     fn keys(&mut self, ui: &Ui, desk: &Desk, step: f32) {
         let pressed = |key| ui.ctx().input(|input| input.key_pressed(key));
         let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
-        if pressed(Key::Tab) {
+        if pressed(Key::F1) {
             self.is_bare = !self.is_bare;
         }
         if pressed(Key::F12) {
@@ -299,6 +299,9 @@ impl Viewer {
         }
         if pressed(Key::F5) {
             self.wants_state = true;
+        }
+        if pressed(Key::R) {
+            self.ask_again();
         }
         if pressed(Key::P) {
             self.toggle_profile(desk);
