@@ -136,12 +136,11 @@ impl Profiler {
             let x = rect.left() + rect.width() * (i as f32 + 0.5) / WINDOW as f32;
             Pos2::new(x, rect.bottom() - rect.height() * (ms / most) as f32)
         };
-        let times: [(fn(&FrameTimes) -> f64, Color32); 2] =
-            [(|frame| frame.wall_ms, Color32::LIGHT_BLUE), (|frame| frame.gpu_ms, Color32::ORANGE)];
-        for (ms, color) in times {
-            let points = self.frames.iter().enumerate().map(|(i, frame)| point(i, ms(frame))).collect();
-            painter.add(Shape::line(points, Stroke::new(1.5, color)));
-        }
+        let frames = || self.frames.iter().enumerate();
+        let wall = frames().map(|(i, frame)| point(i, frame.wall_ms)).collect();
+        let passes = frames().map(|(i, frame)| point(i, frame.gpu_ms)).collect();
+        painter.add(Shape::line(wall, Stroke::new(1.5, Color32::LIGHT_BLUE)));
+        painter.add(Shape::line(passes, Stroke::new(1.5, Color32::ORANGE)));
         painter.text(
             rect.left_top(),
             egui::Align2::LEFT_TOP,
