@@ -6,8 +6,8 @@
 
 // One thread per pixel: all light but the punctual one, by the vector irradiance of the leaf element seen there. Each
 // channel shines along its own vector.                                                 [Gobbetti2003 3.5, Eq. 10]
-// reads the G-buffer, triangles, positions, normals, elements, triangle_elements, direct_irradiance and
-//       indirect_irradiance (per element and function, W/m2), colors (per element)
+// reads the G-buffer, triangles, positions, normals, leaves, triangle_leaves, direct_irradiance and
+//       indirect_irradiance (per leaf and function), colors (per leaf)
 // updates direct, indirect [pixel_count]   shared none
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
@@ -19,10 +19,10 @@ layout(set = 0, binding = 5) uniform sampler2D g_emission;
 layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Normals { vec3 normals[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer Elements { FaceElement elements[]; };
-layout(set = 0, binding = 10, scalar) readonly buffer TriangleElements { uvec2 triangle_elements[]; };
-layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { mat3 direct_irradiance[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { mat3 indirect_irradiance[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Leaves { LeafElement leaves[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer TriangleLeaves { uvec2 triangle_leaves[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { HalfVectors direct_irradiance[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { HalfVectors indirect_irradiance[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer Colors { vec3 colors[]; };
 layout(set = 0, binding = 14, scalar) buffer Direct { vec3 direct[]; };
 layout(set = 0, binding = 15, scalar) buffer Indirect { vec3 indirect[]; };
@@ -31,6 +31,7 @@ layout(constant_id = 0) const uint IRRADIANCE_FUNCTIONS = 3u;
 layout(push_constant, scalar) uniform Params {
     vec4 eye;
     float weight;
+    float unit;             // of irradiance, W/m2
     float least_alpha;      // lobes are at least so wide: one direction stands for all light
     uint per_vertex;        // shade at the triangle's corners and interpolate
     uint shows_colors;      // unlit
@@ -47,14 +48,14 @@ vec3 radiance(Surface s, vec3 to_eye, mat3 vectors)
     return sum;
 }
 
-void shade(Surface s, uint element, vec3 point, out vec3 direct_radiance, out vec3 indirect_radiance)
+void shade(Surface s, uint leaf, vec3 point, out vec3 direct_radiance, out vec3 indirect_radiance)
 {
-    vec2 uv = clamp(plane_coordinates(elements[element], point), 0.0, 1.0);
+    vec2 uv = clamp(plane_coordinates(leaves[leaf], point), 0.0, 1.0);
     mat3 d = mat3(0.0), i = mat3(0.0);
     for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
         float b = basis(k, uv);
-        d += b * direct_irradiance[element * IRRADIANCE_FUNCTIONS + k];
-        i += b * indirect_irradiance[element * IRRADIANCE_FUNCTIONS + k];
+        d += b * unpacked(direct_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
+        i += b * unpacked(indirect_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
     }
     vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - point);
     direct_radiance = radiance(s, to_eye, d);
@@ -77,25 +78,25 @@ void main()
 
     uvec3 v = triangles[seen - 1];
     bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), to_eye) < 0.0;
-    uvec2 sides = triangle_elements[seen - 1];
-    uint element = is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
-    if (element == NO_FACE_ELEMENT) return;
+    uvec2 sides = triangle_leaves[seen - 1];
+    uint leaf = is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
+    if (leaf == NO_FACE_ELEMENT) return;
 
     uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
     if (params.shows_colors != 0) {
-        direct[index] += params.weight * colors[element];
+        direct[index] += params.weight * colors[leaf];
         return;
     }
     vec3 direct_sum, indirect_sum;
     if (params.per_vertex == 0) {
-        shade(s, element, position.xyz, direct_sum, indirect_sum);
+        shade(s, leaf, position.xyz, direct_sum, indirect_sum);
     } else {
         direct_sum = indirect_sum = vec3(0.0);
         vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
         for (uint k = 0; k < 3; ++k) {
             s.normal = is_back ? -normals[v[k]] : normals[v[k]];
             vec3 d, i;
-            shade(s, element, positions[v[k]], d, i);
+            shade(s, leaf, positions[v[k]], d, i);
             direct_sum += w[k] * d;
             indirect_sum += w[k] * i;
         }

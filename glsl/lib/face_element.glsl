@@ -41,6 +41,7 @@ const uint PAIR_IS_DONE = 0u;
 const uint SPLIT_RECEIVER = 1u;
 const uint SPLIT_SHOOTER = 2u;
 const uint SPLIT_BOTH = 3u;     // a self transfer: all pairs of its children
+const uint PAIR_WAITS = 4u;     // for elements: the pool is full, and the host makes it larger
 const uint IS_LIGHT = 0x80000000u;  // of a shooter: an index of the table of lights
 
 struct PoolCounters {
@@ -89,6 +90,39 @@ bool may_face(FaceElement e, FaceElement other)
         if (dot(offset, axis) + reach(e, axis) + reach(other, axis) > tolerance) return true;
     }
     return false;
+}
+
+// What is kept of a leaf to show its light.
+struct LeafElement {
+    vec3 center;            // metres, world
+    vec3 axis_x;            // unit
+    vec3 axis_y;
+    vec2 half_extent;       // metres along them
+};
+
+vec2 plane_coordinates(LeafElement e, vec3 point)
+{
+    vec3 d = point - e.center;
+    return 0.5 + 0.5 * vec2(dot(d, e.axis_x), dot(d, e.axis_y)) / max(e.half_extent, vec2(1e-30));
+}
+
+// Irradiance vectors of the three channels in half floats of a unit that fits them.
+struct HalfVectors {
+    uint words[5];
+};
+
+HalfVectors packed(mat3 vectors, float inverse_unit)
+{
+    mat3 v = inverse_unit * vectors;
+    return HalfVectors(uint[5](packHalf2x16(v[0].xy), packHalf2x16(vec2(v[0].z, v[1].x)), packHalf2x16(v[1].yz),
+                               packHalf2x16(v[2].xy), packHalf2x16(vec2(v[2].z, 0.0))));
+}
+
+mat3 unpacked(HalfVectors h, float unit)
+{
+    vec2 a = unpackHalf2x16(h.words[0]), b = unpackHalf2x16(h.words[1]), c = unpackHalf2x16(h.words[2]);
+    vec2 d = unpackHalf2x16(h.words[3]), e = unpackHalf2x16(h.words[4]);
+    return unit * mat3(a, b, c, d, e.x);
 }
 
 // A point of the element's horizontal plane; (0, 0) and (1, 1) are corners of its box.

@@ -313,11 +313,11 @@ impl Method {
                         None
                     }
                 };
+                let solution = method.keep(context).map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
-                let colors = method.colors(context).map_err(AppError::failed)?;
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
-                    let light = method.light(&colors);
+                    let light = method.light(&solution);
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     irradiance_vector::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
                 });

@@ -45,8 +45,8 @@ pub fn draw(
                 triangles: &world.triangles,
                 positions: &world.positions,
                 normals: &world.normals,
-                elements: light.elements,
-                triangle_elements: light.triangle_elements,
+                leaves: light.leaves,
+                triangle_leaves: light.triangle_leaves,
                 direct_irradiance: light.direct,
                 indirect_irradiance: light.indirect,
                 colors: light.colors,
@@ -55,6 +55,7 @@ pub fn draw(
                 params: IrradianceVectorParams {
                     eye: pixel_view.eye,
                     weight: 1.0 / samples as f32,
+                    unit: light.unit,
                     least_alpha: light.least_alpha,
                     per_vertex: u32::from(light.per_vertex),
                     shows_colors: u32::from(light.shows_colors),

@@ -96,16 +96,33 @@ impl PairQueue {
         context: &Context,
         name: &str,
         seeds: &[UVec2],
-        mut step: impl FnMut(&mut Recorder<'_>),
-        mut goes_on: impl FnMut(&PairCounters) -> bool,
+        step: impl FnMut(&mut Recorder<'_>),
+        goes_on: impl FnMut(&PairCounters) -> bool,
     ) -> Result<PairCounters, PairQueueError> {
+        self.start(context, seeds)?;
+        self.go_on_while(context, name, step, goes_on)
+    }
+
+    /// Puts the pairs to start from on the stack, and nothing else.
+    pub fn start(&self, context: &Context, seeds: &[UVec2]) -> Result<(), PairQueueError> {
         let capacity = self.plan.capacity();
         if seeds.len() > capacity as usize {
             return Err(PairQueueError::Seeds { seeds: seeds.len(), capacity });
         }
         context.write(&self.stack, seeds)?;
         let start = PairCounters { top: seeds.len() as u32, taken: 0, visited: 0, accepted: 0, highest: 0, is_full: 0 };
-        context.write(&self.counters, &[start])?;
+        Ok(context.write(&self.counters, &[start])?)
+    }
+
+    /// Refines what is on the stack, as [`Self::refine_while`]; what is left stays there.
+    pub fn go_on_while(
+        &self,
+        context: &Context,
+        name: &str,
+        mut step: impl FnMut(&mut Recorder<'_>),
+        mut goes_on: impl FnMut(&PairCounters) -> bool,
+    ) -> Result<PairCounters, PairQueueError> {
+        let capacity = self.plan.capacity();
         loop {
             let mut recorder = context.recorder(name)?;
             for _ in 0..STEPS_PER_SUBMISSION {

@@ -1,11 +1,15 @@
 //! The tree of face clusters: what a tree must be, bounds that are bounds, and which faces go together.
 
-use crate::common::Random;
+use crate::common::scenes::{lambert, parallelogram, scene};
+use crate::common::{Random, TestContext};
+use crate::fixture::Fixture;
 use glam::Vec3;
+use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::FaceCluster;
 use linklight::stages::clusters::{
     ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, is_convex, least_projected_area, most_projected_area,
 };
+use linklight::stages::world::World;
 
 /// A mesh of one material.
 struct Mesh {
@@ -304,4 +308,45 @@ fn trees_are_kept_between_runs() {
     let mut other = sheet(50, |x, y| 0.1 * (5.0 * x).sin() * y);
     other.albedo[7] = Vec3::X;
     assert_ne!(cache::key(&other.faces(&dark)), cache::key(&faces));
+}
+
+/// Untextured materials: base colour less metal, what reflects along the normal, and emission, of every triangle.
+#[test]
+fn materials_of_faces_are_means() {
+    let context = TestContext::new();
+    let mut metal = lambert(Vec3::new(0.8, 0.6, 0.4));
+    (metal.metallic, metal.specular) = (0.25, 1.0);
+    metal.emission = Vec3::new(0.5, 2.0, 7.0);
+    let sheets = [0u32, 1].map(|k| parallelogram(Vec3::X * k as f32, Vec3::X, Vec3::Z, 3, k));
+    let fixture = Fixture::new(&context, scene(vec![lambert(Vec3::splat(0.5)), metal], sheets.to_vec(), &[]), None);
+    let Fixture { scene, geometry, pose, environment, .. } = &fixture;
+    let world = &World::new(&context, scene, geometry, pose, environment, false).unwrap();
+    let count = geometry.triangles.len();
+    let tables = [0, 1, 2].map(|_| context.upload("test/faces", &vec![Vec3::NAN; count]).unwrap());
+    let mut recorder = context.recorder("test").unwrap();
+    let pass = passes::FaceMaterials {
+        triangles: &world.triangles,
+        triangle_materials: &world.triangle_materials,
+        attributes: &world.attributes,
+        materials: &world.materials,
+        albedo: &tables[0],
+        reflectance: &tables[1],
+        emission: &tables[2],
+        textures: &world.textures,
+        params: passes::FaceMaterialsParams { triangle_count: count as u32 },
+    };
+    recorder.dispatch(&pass, count);
+    recorder.submit().unwrap();
+    let [albedo, reflectance, emission] = tables.map(|table| context.download(&table).unwrap());
+    let of_material: Vec<u32> = context.download(&world.triangle_materials).unwrap();
+    for t in 0..count {
+        let material = &fixture.scene.materials[of_material[t] as usize];
+        let base = material.base_color.truncate();
+        let diffuse = base * (1.0 - material.metallic);
+        assert!(albedo[t].abs_diff_eq(diffuse, 1e-5), "{} expected {diffuse}", albedo[t]);
+        assert!(emission[t].abs_diff_eq(material.emission, 1e-5));
+        let specular = base * material.metallic + 0.04 * material.specular * (1.0 - material.metallic);
+        assert!(reflectance[t].abs_diff_eq(diffuse + specular, 1e-5), "{} of {diffuse} and {specular}", reflectance[t]);
+        assert!(!albedo[t].abs_diff_eq(diffuse * 1.01, 1e-5), "a wrong albedo is noticed");
+    }
 }

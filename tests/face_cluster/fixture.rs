@@ -2,7 +2,7 @@
 
 use crate::common::TestContext;
 use glam::{Mat3, Vec3};
-use linklight::gpu::shaders::types::FaceElement;
+use linklight::gpu::shaders::types::{FaceElement, HalfVectors};
 use linklight::methods::face_cluster::{FaceClusterError, FaceClusters, Settings, Stage};
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
@@ -105,7 +105,12 @@ pub fn leaves(context: &TestContext, method: &FaceClusters) -> Vec<Leaf> {
         if element.children == u32::MAX {
             let normal = element.axis_z * ((element.facing[4] - element.facing[5]) / element.area);
             let along = |of: &[[[f32; 3]; 3]]| Mat3::from_cols_array_2d(&of[i * functions]).transpose() * normal;
-            leaves.push(Leaf { index: i as u32, direct: along(&direct), indirect: along(&indirect), element });
+            leaves.push(Leaf {
+                index: leaves.len() as u32,
+                direct: along(&direct),
+                indirect: along(&indirect),
+                element,
+            });
         }
     }
     leaves
@@ -118,4 +123,17 @@ pub fn received(leaves: &[Leaf], wanted: impl Fn(&FaceElement) -> bool) -> (f64,
         let a = f64::from(leaf.element.area);
         (power + a * f64::from(leaf.direct.x + leaf.indirect.x), area + a)
     })
+}
+
+/// Nine numbers out of a record of half floats.
+pub fn of_halves(halves: &HalfVectors, unit: f32) -> [f32; 9] {
+    let half = |bits: u32| {
+        let (sign, exponent, mantissa) = (bits >> 15 & 1, (bits >> 10 & 31) as i32, (bits & 1023) as f32);
+        let size = match exponent {
+            0 => mantissa * 2f32.powi(-24),
+            _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
+        };
+        unit * if sign == 1 { -size } else { size }
+    };
+    std::array::from_fn(|k| half(halves.words[k / 2] >> (16 * (k % 2) as u32) & 0xffff))
 }

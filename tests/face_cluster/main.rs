@@ -1,8 +1,13 @@
-//! Face-cluster radiosity: clusters and their bounds, bases, transport, closed forms, energy.
+//! Face-cluster radiosity: clusters and their bounds, bases, kernels against twins, closed forms, energy.
 #[path = "../common/mod.rs"]
 mod common;
 
 mod bases;
 mod clusters;
 mod fixture;
+mod grown;
+mod kernels;
+mod pair_twins;
+mod pairs;
 mod physics;
+mod twins;

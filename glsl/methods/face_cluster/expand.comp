@@ -23,8 +23,11 @@ void main()
 
     uvec2 pair = taken_pairs[i];
     uint first = elements[decision == SPLIT_SHOOTER ? pair.y : pair.x].children;
-    // Without children only where the pool is full: the host gives up.
-    if (first == NO_FACE_ELEMENT) return;
+    // Without children only where the pool is full: decided again when there is room.
+    if (decision == PAIR_WAITS || first == NO_FACE_ELEMENT) {
+        pair_stack[atomicAdd(counters[0].top, 1)] = pair;
+        return;
+    }
     uint count = decision == SPLIT_BOTH ? 4 : 2;
     uint slot = atomicAdd(counters[0].top, count);
     for (uint k = 0; k < count; ++k) {

@@ -19,7 +19,7 @@ void main()
     uint i = linear_index();
     if (i >= counters[0].taken) return;
     uint decision = decisions[i];
-    if (decision == PAIR_IS_DONE) return;
+    if (decision == PAIR_IS_DONE || decision == PAIR_WAITS) return;
 
     // Whoever is first claims them; other kernels read the place only after this one.
     uint index = decision == SPLIT_SHOOTER ? taken_pairs[i].y : taken_pairs[i].x;

@@ -38,6 +38,10 @@ void main()
 {
     uint i = linear_index();
     if (i >= counters[0].taken) return;
+    if (pool[0].is_full != 0) {
+        decisions[i] = PAIR_WAITS;
+        return;
+    }
     uint receiver = taken_pairs[i].x, shooter = taken_pairs[i].y;
     FaceElement a = elements[receiver], b = elements[shooter];
     decisions[i] = PAIR_IS_DONE;

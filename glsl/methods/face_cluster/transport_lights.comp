@@ -26,6 +26,10 @@ void main()
 {
     uint i = linear_index();
     if (i >= counters[0].taken) return;
+    if (pool[0].is_full != 0) {
+        decisions[i] = PAIR_WAITS;
+        return;
+    }
     uint receiver = taken_pairs[i].x;
     FaceElement a = elements[receiver];
     Light light = lights[taken_pairs[i].y & ~IS_LIGHT];

@@ -13,7 +13,7 @@
 //! | element i | [`FaceElement`] | – | [`State::elements`] |
 //! | Phi_a | `basis`, [`Settings::irradiance_basis`], [`Settings::radiosity_basis`] | 1 | `lib/cluster_basis.glsl` |
 //! | m(x, y), K | made where needed | m^-2 | `transport` |
-//! | E_i,a | irradiance vector, a column a channel; direct and indirect | W/m2 | `face-cluster/direct`, `face-cluster/indirect` |
+//! | E_i,a | irradiance vector, a column a channel; direct and indirect | W/m2 | `face-cluster/direct`, `face-cluster/indirect`; of leaves, kept: [`Solution`] |
 //! | Delta E | arriving, whole units | W/m2 | `face-cluster/arriving` |
 //! | Delta B, Delta B' | unshot, next unshot | W/m2 | `face-cluster/unshot`, `face-cluster/next unshot` |
 //! | delta_ij | error against [`Settings::threshold`] | W | `transport` |
@@ -26,7 +26,8 @@
 //! in whole units, so that the result does not depend on their order; punctual lights and an environment shine too;
 //! cubature nodes are laid on the faces, and a shooter of one face is measured exactly;
 //! errors are judged against the light they belong to; a transfer takes one shadow ray per receiver node unless told otherwise;
-//! (1 - F_ii) is not applied, since the vector area already holds it; irradiance is allotted to inner elements too.
+//! (1 - F_ii) is not applied, since the vector area already holds it; while light is shot, inner elements have room for
+//! irradiance too, but a [`Solution`] is of leaves alone.
 //!
 //! [Gobbetti2003]: crate::methods::PAPERS
 
@@ -36,13 +37,16 @@ mod report;
 pub mod rules;
 mod shooting;
 pub mod showing;
+mod solution;
+mod state;
 mod transfer;
 
 pub use placement::Placement;
 pub use report::Report;
+pub use solution::Solution;
+pub use state::State;
 
-use crate::gpu::shaders::types::{CubatureNode, FaceElement, PoolCounters};
-use crate::gpu::{Buffer, Context, GpuError};
+use crate::gpu::{Context, GpuError};
 use crate::scene::Scene;
 use crate::scene::environment::Environment;
 use crate::scene::geometry::Geometry;
@@ -51,15 +55,15 @@ use crate::stages::bvh::Bvh;
 use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
 use crate::stages::work::{Interrupted, Watch};
 use crate::stages::world::World;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 use rules::{Basis, Rule};
 use showing::{Shading, Shown};
 use std::path::Path;
 
 /// Pairs of a step of refinement.
-const BATCH: u32 = 1 << 14;
+const BATCH: u32 = 1 << 12;
 /// Pairs that refinement starts from at once.
-const SEEDS: usize = 1 << 16;
+const SEEDS: usize = 1 << 14;
 
 crate::choice! {
     /// Ways to find what blocks light.
@@ -158,34 +162,12 @@ pub struct FaceClusters {
     state: State,
     queue: PairQueue,
     report: Report,
-}
-
-/// Elements and their light; `capacity` entries each unless said otherwise.
-pub struct State {
-    capacity: u32,
-    /// Of the receiver's rule, then of the shooter's.
-    rules: Buffer<CubatureNode>,
-    pub elements: Buffer<FaceElement>,
-    /// Per element and rule node, metres.
-    nodes: Buffer<Vec3>,
-    /// Per element and radiosity function, W/m2.
-    unshot: Buffer<Vec3>,
-    next_unshot: Buffer<Vec3>,
-    /// Per element and irradiance function; a column a channel.
-    direct: Buffer<[[f32; 3]; 3]>,
-    indirect: Buffer<[[f32; 3]; 3]>,
-    /// Per element, irradiance function, channel and axis.
-    arriving: Buffer<i32>,
-    /// One entry.
-    pool: Buffer<PoolCounters>,
-    /// Of each pair of a step.
-    decisions: Buffer<u32>,
-    /// Per triangle: the elements of its front and back.
-    triangle_elements: Buffer<UVec2>,
+    /// Bounds all irradiance of the present solution, W/m2.
+    most_light: f32,
 }
 
 impl FaceClusters {
-    /// Clusters all meshes and makes room for elements: everything but the light itself.
+    /// Clusters all meshes and makes room for their roots: everything but the light itself.
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, FaceClusterError> {
         let Settings { irradiance_basis, radiosity_basis, receiver_rule, .. } = settings;
         if radiosity_basis.functions() > irradiance_basis.functions() {
@@ -210,7 +192,7 @@ impl FaceClusters {
         let plan = PairQueuePlan { batch: BATCH, max_children: 4, levels, seeds: SEEDS as u32 };
         let queue = PairQueue::new(context, "face-cluster", plan)?;
         let report = Report::new(stage, &placement, clustering);
-        Ok(Self { settings, placement, state, queue, report })
+        Ok(Self { settings, placement, state, queue, report, most_light: 0.0 })
     }
 
     pub fn settings(&self) -> &Settings {
@@ -227,59 +209,5 @@ impl FaceClusters {
 
     pub fn report(&self) -> &Report {
         &self.report
-    }
-}
-
-impl State {
-    fn new(
-        context: &Context,
-        settings: &Settings,
-        placement: &Placement,
-        triangle_count: u32,
-    ) -> Result<Self, FaceClusterError> {
-        let mut rules = settings.receiver_rule.nodes();
-        rules.extend(settings.shooter_rule.nodes());
-        let functions = settings.irradiance_basis.functions() as usize;
-        let radiosity_functions = settings.radiosity_basis.functions() as usize;
-        // The largest table of an element, and all of them, bytes.
-        let widest = (12 * rules.len()).max(36 * functions).max(size_of::<FaceElement>());
-        let all = size_of::<FaceElement>() + 12 * rules.len() + 24 * radiosity_functions + 108 * functions;
-        let allowed = context.limits().storage_buffer_bytes / widest as u64;
-        let wanted = placement.placed_clusters.min(settings.max_elements.into()).max(placement.instance_count.into());
-        let (needed, available) = (wanted * all as u64, context.available_bytes());
-        if wanted > allowed || needed > available {
-            return Err(FaceClusterError::OutOfMemory { needed, available: available.min(allowed * all as u64) });
-        }
-        let capacity = wanted as usize;
-        let buffer = |name: &str| format!("face-cluster/{name}");
-        Ok(Self {
-            capacity: wanted as u32,
-            rules: context.upload(&buffer("rules"), &rules)?,
-            elements: context.buffer(&buffer("elements"), capacity)?,
-            nodes: context.buffer(&buffer("nodes"), capacity * rules.len())?,
-            unshot: context.buffer(&buffer("unshot"), capacity * radiosity_functions)?,
-            next_unshot: context.buffer(&buffer("next unshot"), capacity * radiosity_functions)?,
-            direct: context.buffer(&buffer("direct"), capacity * functions)?,
-            indirect: context.buffer(&buffer("indirect"), capacity * functions)?,
-            arriving: context.buffer(&buffer("arriving"), capacity * functions * 9)?,
-            pool: context.buffer(&buffer("pool"), 1)?,
-            decisions: context.buffer(&buffer("decisions"), BATCH as usize)?,
-            triangle_elements: context.buffer(&buffer("triangle elements"), triangle_count as usize)?,
-        })
-    }
-
-    /// From emitters and the environment, per element and function; of leaves.
-    pub fn direct(&self) -> &Buffer<[[f32; 3]; 3]> {
-        &self.direct
-    }
-
-    /// Reflected at least once, per element and function; of leaves.
-    pub fn indirect(&self) -> &Buffer<[[f32; 3]; 3]> {
-        &self.indirect
-    }
-
-    /// Per triangle: the leaf elements of its front and back, u32::MAX where there is none.
-    pub fn triangle_elements(&self) -> &Buffer<UVec2> {
-        &self.triangle_elements
     }
 }

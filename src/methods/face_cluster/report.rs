@@ -22,10 +22,10 @@ pub struct Report {
     pub element_depth: u32,
     /// Passes of light: punctual, direct and each bounce.
     pub iterations: Vec<Iteration>,
-    /// Elements with all their tables.
+    /// Leaves with their irradiance: what is kept.
     pub solution_bytes: u64,
-    /// What arrives during an iteration; not part of the solution.
-    pub scratch_bytes: u64,
+    /// Elements with all tables that shooting needs; given back after it.
+    pub working_bytes: u64,
     pub solve_seconds: f64,
 }
 

@@ -52,6 +52,7 @@ impl FaceClusters {
         let clock = Instant::now();
         let self_threshold = self.settings.threshold;
         self.report.iterations.clear();
+        self.most_light = 0.0;
         self.start(context, stage)?;
         let [low, high] = stage.bounds;
         let diagonal = (high - low).length().max(f32::MIN_POSITIVE);
@@ -109,34 +110,6 @@ impl FaceClusters {
         stage.watch.step("light", count, count)?;
         self.locate(context, stage)?;
         self.report.solve_seconds = clock.elapsed().as_secs_f64();
-        Ok(())
-    }
-
-    /// Finds the leaf of every triangle, and counts.
-    pub fn locate(&mut self, context: &Context, stage: &Stage<'_>) -> Result<(), FaceClusterError> {
-        let (s, p) = (&self.state, &self.placement);
-        let mut recorder = context.recorder("face-cluster")?;
-        let pass = passes::Locate {
-            elements: &s.elements,
-            triangle_places: &p.places,
-            triangle_roots: &p.triangle_roots,
-            triangle_elements: &s.triangle_elements,
-            params: passes::LocateParams { triangle_count: stage.world.triangle_count },
-        };
-        recorder.dispatch(&pass, stage.world.triangle_count);
-        recorder.submit()?;
-        let counters = context.download(&s.pool)?[0];
-        let functions = u64::from(self.settings.irradiance_basis.functions());
-        let elements = u64::from(counters.element_count);
-        let of_element =
-            s.elements.size_bytes() + s.nodes.size_bytes() + s.unshot.size_bytes() + s.next_unshot.size_bytes();
-        self.report.elements = counters.element_count;
-        // Every split makes one leaf more.
-        self.report.leaves = (counters.element_count + p.instance_count) / 2;
-        self.report.element_depth = counters.deepest_level;
-        self.report.solution_bytes =
-            of_element / u64::from(s.capacity.max(1)) * elements + 2 * 36 * functions * elements;
-        self.report.scratch_bytes = 36 * functions * elements;
         Ok(())
     }
 

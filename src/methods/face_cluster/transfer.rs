@@ -40,6 +40,9 @@ impl FaceClusters {
         for seeds in self.seeds(pass.shooters).chunks(SEEDS) {
             pairs += self.refine(context, stage, pass, units, seeds)?;
         }
+        if pass.kept != Kept::No {
+            self.most_light += pass.most;
+        }
         let counters = context.download(&self.state.pool)?[0];
         self.settle(context, pass.kept, 1.0 / units, &counters)?;
 
@@ -73,44 +76,49 @@ impl FaceClusters {
 
     /// Splits and transports until nothing is left; returns the number of pairs looked at.
     fn refine(
-        &self,
+        &mut self,
         context: &Context,
         stage: &Stage<'_>,
         pass: &LightPass<'_>,
         units: f32,
         seeds: &[UVec2],
     ) -> Result<u64, FaceClusterError> {
-        let (s, queue) = (&self.state, &self.queue);
-        let is_emission = matches!(pass.shooters, Shooters::Emission);
-        let step = |recorder: &mut Recorder<'_>| {
-            self.decide(recorder, stage, pass, units);
-            self.grow(recorder, stage, is_emission);
-            let expand = passes::Expand {
-                taken_pairs: &queue.taken,
-                decisions: &s.decisions,
-                elements: &s.elements,
-                counters: &queue.counters,
-                pair_stack: &queue.stack,
-                pool: &s.pool,
+        self.queue.start(context, seeds)?;
+        loop {
+            let mut outcome = Ok(false);
+            // Between submissions: whether the elements still have room, and the work is still wanted.
+            let look = |counters: &PairCounters| -> Result<bool, FaceClusterError> {
+                let seen = u64::from(counters.visited);
+                stage.watch.step(&pass.name, seen, seen + u64::from(counters.top))?;
+                Ok(context.download(&self.state.pool)?[0].is_full != 0)
             };
-            recorder.dispatch_indirect(&expand, &queue.groups, 0);
-        };
-        // Between submissions: whether the elements still have room, and the work is still wanted.
-        let look = |counters: &PairCounters| -> Result<(), FaceClusterError> {
-            if context.download(&s.pool)?[0].is_full != 0 {
-                return Err(FaceClusterError::PoolFull { capacity: s.capacity, threshold: self.settings.threshold });
+            let step = |recorder: &mut Recorder<'_>| self.step(recorder, stage, pass, units);
+            let counters = self.queue.go_on_while(context, "face-cluster", step, |counters| {
+                outcome = look(counters);
+                matches!(outcome, Ok(false))
+            })?;
+            if !outcome? && !look(&counters)? {
+                return Ok(counters.visited.into());
             }
-            let seen = u64::from(counters.visited);
-            Ok(stage.watch.step(&pass.name, seen, seen + u64::from(counters.top))?)
+            // Pairs that found no room for children wait on the stack.
+            self.state.grow(context, &self.settings, self.placement.instance_count)?;
+        }
+    }
+
+    /// Decides the pairs of a step, makes what is to be split, and puts the halves back.
+    fn step(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, units: f32) {
+        let (s, queue) = (&self.state, &self.queue);
+        self.decide(recorder, stage, pass, units);
+        self.grow(recorder, stage, matches!(pass.shooters, Shooters::Emission));
+        let expand = passes::Expand {
+            taken_pairs: &queue.taken,
+            decisions: &s.decisions,
+            elements: &s.elements,
+            counters: &queue.counters,
+            pair_stack: &queue.stack,
+            pool: &s.pool,
         };
-        let mut outcome = Ok(());
-        let counters = queue.refine_while(context, "face-cluster", seeds, step, |counters| {
-            outcome = look(counters);
-            outcome.is_ok()
-        })?;
-        outcome?;
-        look(&counters)?;
-        Ok(counters.visited.into())
+        recorder.dispatch_indirect(&expand, &queue.groups, 0);
     }
 
     /// Transports the pairs of a step, or decides how to split them.                       [Gobbetti2003 3.3]
@@ -121,85 +129,59 @@ impl FaceClusters {
         let irradiance_functions = self.settings.irradiance_basis.functions();
         let radiosity_functions = self.settings.radiosity_basis.functions();
         let clusters_block = self.settings.visibility == Visibility::Clusters;
+        // Both kernels read the same tables, and write the same (`receive.glsl`).
+        macro_rules! deciding {
+            ($kernel:ident, $($own:tt)*) => {
+                passes::$kernel {
+                    bvh_nodes: stage.bvh.nodes(),
+                    bvh_triangles: stage.bvh.triangles(),
+                    triangles: &world.triangles,
+                    triangle_materials: &world.triangle_materials,
+                    attributes: &world.attributes,
+                    materials: &world.materials,
+                    triangle_places: &p.places,
+                    elements: &s.elements,
+                    element_nodes: &s.nodes,
+                    rules: &s.rules,
+                    cluster_skips: &p.skips,
+                    clusters: &p.clusters,
+                    instances: &p.instances,
+                    tree_faces: &p.faces,
+                    positions: &world.positions,
+                    arriving: &s.arriving,
+                    pool: &s.pool,
+                    textures: &world.textures,
+                    counters: &queue.counters,
+                    taken_pairs: &queue.taken,
+                    decisions: &s.decisions,
+                    $($own)*
+                }
+            };
+        }
+        let (threshold, alpha_test) = (pass.threshold, world.has_holes);
         if let Shooters::Lights(lights, _) = pass.shooters {
             let diagonal = (stage.bounds[1] - stage.bounds[0]).length().max(f32::MIN_POSITIVE);
-            let pass = passes::TransportLights {
-                bvh_nodes: stage.bvh.nodes(),
-                bvh_triangles: stage.bvh.triangles(),
-                triangles: &world.triangles,
-                triangle_materials: &world.triangle_materials,
-                attributes: &world.attributes,
-                materials: &world.materials,
-                triangle_places: &p.places,
-                elements: &s.elements,
-                element_nodes: &s.nodes,
-                rules: &s.rules,
-                cluster_skips: &p.skips,
-                clusters: &p.clusters,
-                instances: &p.instances,
-                tree_faces: &p.faces,
-                positions: &world.positions,
-                arriving: &s.arriving,
-                pool: &s.pool,
-                textures: &world.textures,
-                counters: &queue.counters,
-                taken_pairs: &queue.taken,
-                lights,
-                decisions: &s.decisions,
-                params: passes::TransportLightsParams {
-                    threshold: pass.threshold,
-                    units,
-                    far: 2.0 * diagonal,
-                    ray_offset: RAY_OFFSET * diagonal,
-                },
-                constants: passes::TransportLightsConstants {
-                    receiver_nodes,
-                    shooter_nodes,
-                    irradiance_functions,
-                    alpha_test: world.has_holes,
-                    clusters_block,
-                },
+            let (far, ray_offset) = (2.0 * diagonal, RAY_OFFSET * diagonal);
+            let constants = passes::TransportLightsConstants {
+                receiver_nodes,
+                shooter_nodes,
+                irradiance_functions,
+                alpha_test,
+                clusters_block,
             };
-            recorder.dispatch_indirect(&pass, &queue.groups, 0);
+            let params = passes::TransportLightsParams { threshold, units, far, ray_offset };
+            recorder.dispatch_indirect(&deciding!(TransportLights, lights, params, constants), &queue.groups, 0);
         } else {
-            let pass = passes::Transport {
-                bvh_nodes: stage.bvh.nodes(),
-                bvh_triangles: stage.bvh.triangles(),
-                triangles: &world.triangles,
-                triangle_materials: &world.triangle_materials,
-                attributes: &world.attributes,
-                materials: &world.materials,
-                triangle_places: &p.places,
-                elements: &s.elements,
-                element_nodes: &s.nodes,
-                rules: &s.rules,
-                cluster_skips: &p.skips,
-                clusters: &p.clusters,
-                instances: &p.instances,
-                tree_faces: &p.faces,
-                positions: &world.positions,
-                arriving: &s.arriving,
-                pool: &s.pool,
-                textures: &world.textures,
-                counters: &queue.counters,
-                taken_pairs: &queue.taken,
-                unshot: &s.unshot,
-                decisions: &s.decisions,
-                params: passes::TransportParams {
-                    threshold: pass.threshold,
-                    units,
-                    rays_per_node: self.settings.rays_per_node,
-                },
-                constants: passes::TransportConstants {
-                    receiver_nodes,
-                    shooter_nodes,
-                    irradiance_functions,
-                    radiosity_functions,
-                    alpha_test: world.has_holes,
-                    clusters_block,
-                },
+            let constants = passes::TransportConstants {
+                receiver_nodes,
+                shooter_nodes,
+                irradiance_functions,
+                radiosity_functions,
+                alpha_test,
+                clusters_block,
             };
-            recorder.dispatch_indirect(&pass, &queue.groups, 0);
+            let params = passes::TransportParams { threshold, units, rays_per_node: self.settings.rays_per_node };
+            recorder.dispatch_indirect(&deciding!(Transport, unshot: &s.unshot, params, constants), &queue.groups, 0);
         }
     }
 

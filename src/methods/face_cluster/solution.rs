@@ -1,0 +1,105 @@
+//! What is kept of a solve: the light of its leaves. All else that shooting needs is given back.
+//!
+//! Differs from [Gobbetti2003]: irradiance in half floats of a common unit, and inner elements go altogether, since
+//! nothing is shot from a solution that is shown.
+//!
+//! [Gobbetti2003]: crate::methods::PAPERS
+
+use super::{FaceClusterError, FaceClusters, Stage};
+use crate::gpu::shaders::methods::face_cluster as passes;
+use crate::gpu::shaders::types::{HalfVectors, LeafElement};
+use crate::gpu::{Buffer, Context};
+use crate::stages::scan;
+use glam::Vec3;
+
+/// The largest half float that all light together may come to: four times less than there are.
+const MOST_UNITS: f32 = 16384.0;
+
+/// Light on leaves; their number is that of [`super::State::triangle_leaves`].
+pub struct Solution {
+    pub leaves: Buffer<LeafElement>,
+    /// Per leaf and function, in units: from emitters and the environment.
+    pub direct: Buffer<HalfVectors>,
+    /// Reflected at least once.
+    pub indirect: Buffer<HalfVectors>,
+    /// W/m2.
+    pub unit: f32,
+    pub functions: u32,
+    /// False colours per leaf; one entry, not looked at, where the picture shows light.
+    pub colors: Buffer<Vec3>,
+}
+
+impl Solution {
+    /// Without what tells triangles their leaves, which is the model's.
+    pub fn size_bytes(&self) -> u64 {
+        self.leaves.size_bytes() + self.direct.size_bytes() + self.indirect.size_bytes()
+    }
+}
+
+impl FaceClusters {
+    /// Numbers the leaves, finds that of every triangle, and counts. After an interruption too.
+    pub fn locate(&mut self, context: &Context, stage: &Stage<'_>) -> Result<(), FaceClusterError> {
+        let (s, p) = (&self.state, &self.placement);
+        let counters = context.download(&s.pool)?[0];
+        let element_count = counters.element_count.min(s.capacity);
+        let mut recorder = context.recorder("face-cluster")?;
+        let flag = passes::FlagLeaves {
+            elements: &s.elements,
+            leaf_indices: &s.leaf_indices,
+            params: passes::FlagLeavesParams { element_count },
+        };
+        recorder.dispatch(&flag, element_count);
+        scan::exclusive(&mut recorder, &s.leaf_indices, element_count as usize, &s.scan);
+        let pass = passes::Locate {
+            elements: &s.elements,
+            triangle_places: &p.places,
+            triangle_roots: &p.triangle_roots,
+            leaf_indices: &s.leaf_indices,
+            triangle_leaves: &s.triangle_leaves,
+            params: passes::LocateParams { triangle_count: stage.world.triangle_count },
+        };
+        recorder.dispatch(&pass, stage.world.triangle_count);
+        recorder.submit()?;
+        self.report.elements = element_count;
+        // Every split makes one leaf more.
+        self.report.leaves = (element_count + p.instance_count) / 2;
+        self.report.element_depth = counters.deepest_level;
+        self.report.working_bytes = super::State::bytes(&self.settings, element_count);
+        Ok(())
+    }
+
+    /// What is to be shown of what was solved and located; everything else is given back.
+    pub fn keep(&mut self, context: &Context) -> Result<Solution, FaceClusterError> {
+        let (s, functions) = (&self.state, self.settings.irradiance_basis.functions());
+        let leaves = self.report.leaves as usize;
+        let unit = (self.most_light / MOST_UNITS).max(f32::MIN_POSITIVE);
+        let solution = Solution {
+            leaves: context.buffer("face-cluster/leaves", leaves)?,
+            direct: context.buffer("face-cluster/leaf direct", leaves * functions as usize)?,
+            indirect: context.buffer("face-cluster/leaf indirect", leaves * functions as usize)?,
+            unit,
+            functions,
+            colors: self.colors(context)?,
+        };
+        let mut recorder = context.recorder("face-cluster")?;
+        let pass = passes::KeepLeaves {
+            elements: &s.elements,
+            leaf_indices: &s.leaf_indices,
+            direct_irradiance: &s.direct,
+            indirect_irradiance: &s.indirect,
+            leaves: &solution.leaves,
+            leaf_direct: &solution.direct,
+            leaf_indirect: &solution.indirect,
+            params: passes::KeepLeavesParams {
+                element_count: self.report.elements,
+                functions,
+                inverse_unit: 1.0 / unit,
+            },
+        };
+        recorder.dispatch(&pass, self.report.elements);
+        recorder.submit()?;
+        self.report.solution_bytes = solution.size_bytes();
+        self.state.shrink(context, &self.settings, self.placement.instance_count)?;
+        Ok(solution)
+    }
+}

@@ -1,0 +1,344 @@
+//! Twins of what decides pairs: visibility, transport, bounds and splits.
+
+use crate::twins::{Tables, Vectors, basis, count, frame, turn, vector_area};
+use glam::{DVec3, Vec3};
+use linklight::gpu::shaders::types::{ClusterInstance, FaceElement, Light};
+use std::f64::consts::PI;
+
+pub const DONE: u32 = 0;
+pub const SPLIT_RECEIVER: u32 = 1;
+pub const SPLIT_SHOOTER: u32 = 2;
+pub const SPLIT_BOTH: u32 = 3;
+
+fn axes(e: &FaceElement) -> [DVec3; 3] {
+    [e.axis_x, e.axis_y, e.axis_z].map(|axis| axis.as_dvec3())
+}
+
+fn least_area(e: &FaceElement, d: DVec3) -> f64 {
+    vector_area(e) * e.axis_z.as_dvec3().dot(d).max(0.0)
+}
+
+fn most_area(e: &FaceElement, d: DVec3) -> f64 {
+    let of_axis = |k: usize| {
+        let along = axes(e)[k].dot(d);
+        f64::from(if along > 0.0 { e.facing[2 * k] } else { e.facing[2 * k + 1] }) * along.abs()
+    };
+    (0..3).map(of_axis).sum()
+}
+
+/// Whether some side of `e` looks at some corner of the box of `other`.
+fn may_face(e: &FaceElement, other: &FaceElement) -> bool {
+    let size = |e: &FaceElement| f64::from(e.half_extent.x + e.half_extent.y);
+    let corners = |e: &FaceElement| -> Vec<DVec3> {
+        let corner = |k: u32| {
+            let sign = |bit: u32| if k >> bit & 1 == 0 { -1.0 } else { 1.0 };
+            (0..3).map(|i| axes(e)[i] * (sign(i as u32) * f64::from(e.half_extent[i]))).sum::<DVec3>()
+        };
+        (0..8).map(|k| e.center.as_dvec3() + corner(k)).collect()
+    };
+    (0..6).any(|k| {
+        let axis = axes(e)[k / 2] * if k % 2 == 0 { 1.0 } else { -1.0 };
+        let lowest = corners(e).iter().map(|p| p.dot(axis)).fold(f64::INFINITY, f64::min);
+        let highest = corners(other).iter().map(|p| p.dot(axis)).fold(f64::NEG_INFINITY, f64::max);
+        e.facing[k] > 1e-3 * e.area && highest - lowest > 1e-5 * (size(e) + size(other))
+    })
+}
+
+/// Irradiance vector of a triangle of radiosity 1, of either side.                              [Arvo1995 Eq. 2.5]
+fn triangle_vector(x: DVec3, corners: [DVec3; 3], towards: DVec3) -> DVec3 {
+    let mut sum = DVec3::ZERO;
+    for k in 0..3 {
+        let (p, q) = ((corners[k] - x).normalize(), (corners[(k + 1) % 3] - x).normalize());
+        sum += p.cross(q).normalize_or_zero() * p.dot(q).clamp(-1.0, 1.0).acos() / (2.0 * PI);
+    }
+    if sum.dot(towards) < 0.0 { -sum } else { sum }
+}
+
+/// What says whether light passes.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Blockers {
+    Triangles,
+    Clusters,
+}
+
+fn meets(x: DVec3, y: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    let d = y - x;
+    let n = (b - a).cross(c - a);
+    let t = (a - x).dot(n) / d.dot(n);
+    let p = x + t * d;
+    t > 1e-4 && t < 1.0 - 1e-4 && [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(p - s).dot(n) >= 0.0)
+}
+
+/// Share of the way from x to y that is free; faces of `passed` (first place and count) block nothing.
+pub fn visibility(t: &Tables, by: Blockers, passed: [[u32; 2]; 2], width: f64, x: DVec3, y: DVec3) -> f64 {
+    let within = |place: u32, [first, count]: [u32; 2]| place >= first && place < first + count;
+    if by == Blockers::Triangles {
+        let blocks = |triangle: u32| {
+            let place = t.places[triangle as usize];
+            !passed.iter().any(|&range| within(place, range)) && meets(x, y, t.corners(triangle))
+        };
+        return if (0..t.triangles.len() as u32).any(blocks) { 0.0 } else { 1.0 };
+    }
+    let mut share = 1.0;
+    for inst in t.instances.iter().filter(|inst| inst.is_back == 0) {
+        share *= past_cluster(t, inst, inst.first_cluster, passed, width, x, y);
+    }
+    share
+}
+
+/// Of one cluster and all below it.
+fn past_cluster(
+    t: &Tables,
+    inst: &ClusterInstance,
+    index: u32,
+    passed: [[u32; 2]; 2],
+    width: f64,
+    x: DVec3,
+    y: DVec3,
+) -> f64 {
+    let c = &t.clusters[index as usize];
+    let (first, last) = (inst.first_triangle + c.first_face, inst.first_triangle + c.first_face + count(c));
+    let is_passed = passed.iter().any(|&[f, n]| first >= f && last <= f + n);
+    let holds = passed.iter().any(|&[f, n]| first < f + n && f < last);
+    let (linear, at) = frame(inst);
+    let to_box = |p: DVec3| turn(c).inverse() * (linear.inverse() * (p - at) - c.center.as_dvec3());
+    let (o, d, h) = (to_box(x), to_box(y) - to_box(x), c.half_extent.as_dvec3());
+    let (mut enter, mut leave) = (1e-4f64, 1.0 - 1e-4f64);
+    for k in 0..3 {
+        let d = if d[k] == 0.0 { 1e-20 } else { d[k] };
+        let (p, q) = ((-h[k] - o[k]) / d, (h[k] - o[k]) / d);
+        (enter, leave) = (enter.max(p.min(q)), leave.min(p.max(q)));
+    }
+    if is_passed || enter > leave {
+        return 1.0;
+    }
+    let shadow = 2.0 * h.length() * f64::from(inst.scale) / (1.0 - 0.5 * (enter + leave)).max(1e-3);
+    match t.children(index) {
+        Some(children) if holds || shadow > width => {
+            children.into_iter().map(|child| past_cluster(t, inst, child, passed, width, x, y)).product()
+        }
+        None if count(c) == 1 => f64::from(u8::from(!meets(x, y, t.corners(t.triangle_at(inst, c.first_face))))),
+        _ if holds => 1.0,
+        _ => {
+            let d = d.normalize();
+            let f = c.facing.map(f64::from);
+            let seen = |sign: f64| -> f64 {
+                (0..3).map(|k| (sign * d[k]).max(0.0) * f[2 * k] + (-sign * d[k]).max(0.0) * f[2 * k + 1]).sum()
+            };
+            let of_box = 4.0 * (d.x.abs() * h.y * h.z + d.y.abs() * h.z * h.x + d.z.abs() * h.x * h.y);
+            1.0 - (seen(1.0).max(seen(-1.0)) / of_box.max(1e-30)).min(1.0)
+        }
+    }
+}
+
+/// Settings of a pass of light.
+#[derive(Clone, Copy)]
+pub struct Way {
+    pub threshold: f64,
+    pub rays_per_node: usize,
+    pub functions: usize,
+    pub by: Blockers,
+}
+
+/// What becomes of a pair.
+pub struct Outcome {
+    pub decision: u32,
+    /// On the receiver's functions, W/m2.
+    pub arrives: Option<Vec<Vectors>>,
+    /// The quotients that decisions compared with 1: near it, single precision may decide otherwise.
+    pub quotients: Vec<f64>,
+}
+
+impl Outcome {
+    fn new(decision: u32, quotients: Vec<f64>) -> Self {
+        Self { decision, arrives: None, quotients }
+    }
+
+    pub fn is_clear(&self) -> bool {
+        self.quotients.iter().all(|q| (q - 1.0).abs() > 1e-3)
+    }
+}
+
+/// What reaches a receiver's nodes, and the bounds of what all of it would reflect, W.
+struct Reaching {
+    at_nodes: Vec<Vectors>,
+    least: Vec<f64>,
+    greatest: Vec<f64>,
+    /// The channel that errors are judged by.
+    channel: usize,
+}
+
+impl Reaching {
+    /// Takes away what is blocked, and decides; `split` where the error is too large.
+    fn decided(
+        mut self,
+        t: &Tables,
+        a: &FaceElement,
+        way: &Way,
+        free: impl Fn(usize) -> f64,
+        (rays, split, node): (usize, u32, usize),
+    ) -> Outcome {
+        let stake = f64::from(a.most_albedo) * self.greatest.iter().copied().fold(0.0, f64::max) / way.threshold;
+        let mut quotients = vec![stake];
+        let is_small = stake <= 1.0;
+        let shares: Vec<f64> = (0..t.receiver_nodes).map(|r| free(if is_small { node } else { r })).collect();
+        let rays = if is_small { 1 } else { rays };
+        if shares.iter().all(|&share| share == 0.0) {
+            quotients.push(stake / (rays as f64 + 2.0));
+            let looks_on = split != DONE && stake > rays as f64 + 2.0;
+            return Outcome::new(if looks_on { split } else { DONE }, quotients);
+        }
+        for (r, &share) in shares.iter().enumerate() {
+            self.at_nodes[r].iter_mut().for_each(|v| *v *= share);
+            self.least[r] *= f64::from(u8::from(share >= 0.999));
+            self.greatest[r] *= f64::from(u8::from(share > 0.0));
+        }
+        let place = |r: usize| t.rules[r].uv.as_dvec2();
+        let on = |k: usize, c: usize| -> DVec3 {
+            let at = |r: usize| f64::from(t.rules[r].weight) * basis(k, place(r)) * self.at_nodes[r][c];
+            (0..t.receiver_nodes).map(at).sum()
+        };
+        let arrives: Vec<Vectors> = (0..way.functions).map(|k| [0, 1, 2].map(|c| on(k, c))).collect();
+        if !is_small && split != DONE {
+            let said = |r: usize| -> f64 {
+                let normal = a.axis_z.as_dvec3() * vector_area(a);
+                let value = |(k, v): (usize, &Vectors)| basis(k, place(r)) * normal.dot(v[self.channel]);
+                arrives.iter().enumerate().map(value).sum()
+            };
+            let off = |r: usize| (said(r) - self.least[r]).max(self.greatest[r] - said(r));
+            let error = (0..t.receiver_nodes).map(off).fold(0.0, f64::max);
+            quotients.push(f64::from(a.most_albedo) * error / way.threshold);
+            if quotients[1] > 1.0 {
+                return Outcome::new(split, quotients);
+            }
+        }
+        Outcome { decision: DONE, arrives: Some(arrives), quotients }
+    }
+}
+
+/// `transport`: a shooter's light to a receiver, or which of them is to be split.               [Gobbetti2003 3.3]
+pub fn transport(
+    t: &Tables,
+    elements: &[FaceElement],
+    nodes: &[Vec<Vec3>],
+    unshot: &[Vec<Vec3>],
+    [receiver, shooter]: [usize; 2],
+    way: &Way,
+) -> Outcome {
+    let (a, b) = (&elements[receiver], &elements[shooter]);
+    let can_split = |e: &FaceElement| t.children(e.cluster).is_some();
+    let brightest = f64::from(unshot[shooter][0].max_element());
+    if brightest <= 0.0 {
+        return Outcome::new(DONE, vec![]);
+    }
+    if receiver == shooter {
+        let share = if a.is_convex != 0 { 0.0 } else { 1.0 - vector_area(a) / f64::from(a.area) };
+        let stake = f64::from(a.most_albedo * a.area) * brightest * share / way.threshold;
+        return Outcome::new(if can_split(a) && stake > 1.0 { SPLIT_BOTH } else { DONE }, vec![stake]);
+    }
+    if !may_face(a, b) || !may_face(b, a) {
+        return Outcome::new(DONE, vec![]);
+    }
+    let shooter_rule = &t.rules[t.receiver_nodes..];
+    let sent: Vec<DVec3> = shooter_rule
+        .iter()
+        .map(|rule| {
+            let value = |(k, v): (usize, &Vec3)| basis(k, rule.uv.as_dvec2()) * v.as_dvec3();
+            unshot[shooter].iter().enumerate().map(value).sum::<DVec3>().max(DVec3::ZERO)
+        })
+        .collect();
+    let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
+    for r in 0..t.receiver_nodes {
+        let x = nodes[receiver][r].as_dvec3();
+        let (mut vectors, mut sum) = ([DVec3::ZERO; 3], 0.0);
+        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        for (e, rule) in shooter_rule.iter().enumerate() {
+            let d = nodes[shooter][t.receiver_nodes + e].as_dvec3() - x;
+            let (squared, direction) = (d.length_squared(), d.normalize());
+            let scale = sent[e].max_element() / (PI * squared);
+            low = low.min(scale * least_area(b, -direction) * least_area(a, direction));
+            high = high.max(scale * most_area(b, -direction) * most_area(a, direction));
+            if direction.dot(a.axis_z.as_dvec3()) > 0.0 {
+                let share = f64::from(rule.weight) * least_area(b, -direction) / (PI * squared);
+                sum += share;
+                (0..3).for_each(|c| vectors[c] += share * sent[e][c] * direction);
+            }
+        }
+        if b.place_count == 1 && sum > 0.0 {
+            let inst = &t.instances[b.instance as usize];
+            let corners = t.corners(t.triangle_at(inst, b.first_place - inst.first_triangle));
+            let exact = triangle_vector(x, corners, b.center.as_dvec3() - x);
+            vectors = [0, 1, 2].map(|c| exact * sent[0][c]);
+            sum = exact.length();
+        }
+        at_nodes.push(vectors.map(|v| v / sum.max(1.0)));
+        least.push(low);
+        greatest.push(high);
+    }
+    let strongest = unshot[shooter][0];
+    let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
+    let turn = (a.cluster * 7 + b.cluster * 13) as usize;
+    let passed = [[a.first_place, a.place_count], [b.first_place, b.place_count]];
+    let ray = |r: usize, k: usize| {
+        let y = nodes[shooter][t.receiver_nodes + (turn + k) % shooter_rule.len()].as_dvec3();
+        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), nodes[receiver][r].as_dvec3(), y)
+    };
+    let reaching = Reaching { at_nodes, least, greatest, channel };
+    let stake = f64::from(a.most_albedo) * reaching.greatest.iter().copied().fold(0.0, f64::max) / way.threshold;
+    let free = |r: usize| {
+        let rounds = if stake <= 1.0 { 1 } else { way.rays_per_node };
+        let first = if stake <= 1.0 { 0 } else { r };
+        (0..rounds).map(|round| ray(r, first + round * t.receiver_nodes)).sum::<f64>() / rounds as f64
+    };
+    let split = match (can_split(a), can_split(b)) {
+        (false, false) => DONE,
+        (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
+        _ => SPLIT_SHOOTER,
+    };
+    reaching.decided(t, a, way, free, (t.receiver_nodes * way.rays_per_node, split, turn % t.receiver_nodes))
+}
+
+/// `transport_lights`: a directional light's or a point light's.
+pub fn transport_light(
+    t: &Tables,
+    a: &FaceElement,
+    nodes: &[Vec3],
+    light: &Light,
+    way: &Way,
+    [far, offset]: [f64; 2],
+) -> Outcome {
+    let of = |r: usize| {
+        let to = light.position.as_dvec3() - nodes[r].as_dvec3();
+        if light.kind == 2 {
+            (-light.direction.as_dvec3(), light.intensity.as_dvec3(), far)
+        } else {
+            (to.normalize(), light.intensity.as_dvec3() / to.length_squared(), to.length())
+        }
+    };
+    let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
+    for r in 0..t.receiver_nodes {
+        let (direction, arrives, _) = of(r);
+        least.push(arrives.max_element() * least_area(a, direction));
+        greatest.push(arrives.max_element() * most_area(a, direction));
+        let faces = direction.dot(a.axis_z.as_dvec3()) > 0.0;
+        at_nodes.push([0, 1, 2].map(|c| if faces { direction * arrives[c] } else { DVec3::ZERO }));
+    }
+    let reaching = Reaching {
+        channel: (0..3).find(|&c| light.intensity[c] == light.intensity.max_element()).unwrap(),
+        at_nodes,
+        least,
+        greatest: greatest.clone(),
+    };
+    let passed = [[a.first_place, a.place_count], [0, 0]];
+    let free = |r: usize| {
+        if greatest[r] <= 0.0 {
+            return 0.0;
+        }
+        let (direction, _, distance) = of(r);
+        let from = nodes[r].as_dvec3();
+        let (x, y) = (from + direction * offset, from + direction * distance.min(far));
+        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
+    };
+    let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
+    reaching.decided(t, a, way, free, (t.receiver_nodes, split, a.cluster as usize % t.receiver_nodes))
+}

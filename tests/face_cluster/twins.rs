@@ -1,0 +1,216 @@
+//! Plain twins of the kernels, in double precision and without regard to speed. Each takes what the kernel reads.
+
+use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
+use linklight::gpu::shaders::types::{ClusterInstance, CubatureNode, FaceCluster, FaceElement};
+use linklight::stages::clusters::{CONVEX, measure::decode_color};
+
+pub const NONE: u32 = u32::MAX;
+
+/// Irradiance vectors of three channels.
+pub type Vectors = [DVec3; 3];
+
+/// What the scene and its clusters are, on the host.
+pub struct Tables {
+    pub clusters: Vec<FaceCluster>,
+    pub skips: Vec<u32>,
+    pub instances: Vec<ClusterInstance>,
+    pub faces: Vec<u32>,
+    pub places: Vec<u32>,
+    pub triangles: Vec<[u32; 3]>,
+    pub positions: Vec<Vec3>,
+    /// Of the receiver, then of the shooter.
+    pub rules: Vec<CubatureNode>,
+    pub receiver_nodes: usize,
+}
+
+impl Tables {
+    pub fn children(&self, cluster: u32) -> Option<[u32; 2]> {
+        let left = cluster + 1;
+        (self.skips[cluster as usize] != left).then(|| [left, self.skips[left as usize]])
+    }
+
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|v| self.positions[v as usize].as_dvec3())
+    }
+
+    pub fn triangle_at(&self, instance: &ClusterInstance, place: u32) -> u32 {
+        instance.first_triangle + self.faces[(instance.first_face + place) as usize]
+    }
+}
+
+pub fn count(cluster: &FaceCluster) -> u32 {
+    cluster.face_count & !CONVEX
+}
+
+pub fn turn(cluster: &FaceCluster) -> DQuat {
+    let [x, y, z, w] = cluster.rotation.map(f64::from);
+    DQuat::from_xyzw(x, y, z, w)
+}
+
+pub fn frame(instance: &ClusterInstance) -> (DMat3, DVec3) {
+    let [x, y, z, at] = instance.world_from_tree.map(|c| Vec3::from_array(c).as_dvec3());
+    (DMat3::from_cols(x, y, z), at)
+}
+
+/// `make_element`: a cluster placed in the world.
+pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32) -> FaceElement {
+    let (inst, c) = (&t.instances[instance as usize], &t.clusters[cluster as usize]);
+    let (linear, at) = frame(inst);
+    let scale = f64::from(inst.scale);
+    let axis = |k: usize| (linear * (turn(c) * [DVec3::X, DVec3::Y, DVec3::Z][k]) / scale).as_vec3();
+    let is_back = inst.is_back != 0;
+    let mut facing = c.facing.map(|sum| (f64::from(sum) * scale * scale) as f32);
+    if is_back {
+        // x with -x, y with -y; z is turned about together with the normals.
+        facing.swap(0, 1);
+        facing.swap(2, 3);
+    }
+    let is_flat = (c.facing[4] - c.facing[5]) / c.area.max(1e-30) > 1.0 - 1e-6;
+    FaceElement {
+        cluster,
+        instance,
+        parent,
+        children: NONE,
+        level,
+        first_place: inst.first_triangle + c.first_face,
+        place_count: count(c),
+        is_convex: u32::from(c.face_count & CONVEX != 0 && (!is_back || is_flat)),
+        center: (linear * c.center.as_dvec3() + at).as_vec3(),
+        axis_x: axis(0),
+        axis_y: axis(1),
+        axis_z: if is_back { -axis(2) } else { axis(2) },
+        half_extent: c.half_extent * inst.scale,
+        area: c.area * inst.scale * inst.scale,
+        facing,
+        albedo: decode_color(c.albedo[1]),
+        most_albedo: decode_color(c.albedo[2]).max_element(),
+        emission: c.emission,
+    }
+}
+
+pub fn plane_point(e: &FaceElement, uv: DVec2) -> DVec3 {
+    let d = 2.0 * uv - 1.0;
+    let (x, y) = (d.x * f64::from(e.half_extent.x), d.y * f64::from(e.half_extent.y));
+    e.center.as_dvec3() + x * e.axis_x.as_dvec3() + y * e.axis_y.as_dvec3()
+}
+
+pub fn plane_coordinates(e: &FaceElement, point: DVec3) -> DVec2 {
+    let d = point - e.center.as_dvec3();
+    let along = DVec2::new(d.dot(e.axis_x.as_dvec3()), d.dot(e.axis_y.as_dvec3()));
+    0.5 + 0.5 * along / e.half_extent.truncate().as_dvec2().max(DVec2::splat(1e-30))
+}
+
+/// The nearest point of a triangle: of its inside, else of a side.
+pub fn nearest(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
+    let [a, b, c] = corners;
+    let n = (b - a).cross(c - a);
+    let foot = p - n * ((p - a).dot(n) / n.length_squared());
+    let sides = [(a, b), (b, c), (c, a)];
+    if sides.iter().all(|&(s, t)| (t - s).cross(foot - s).dot(n) >= 0.0) {
+        return foot;
+    }
+    let on_side =
+        |(s, t): (DVec3, DVec3)| s + (t - s) * ((p - s).dot(t - s) / (t - s).length_squared()).clamp(0.0, 1.0);
+    sides.map(on_side).into_iter().min_by(|x, y| x.distance(p).total_cmp(&y.distance(p))).unwrap()
+}
+
+/// Where each cubature node of an element may lie: on the nearest of its faces, found by the nearer box at every level.
+/// Where two boxes are as near, single precision takes either.
+pub fn places_of_nodes(t: &Tables, e: &FaceElement) -> Vec<Vec<Vec3>> {
+    let inst = &t.instances[e.instance as usize];
+    let (linear, at) = frame(inst);
+    let laid = |rule: &CubatureNode| {
+        let point = plane_point(e, rule.uv.as_dvec2());
+        let q = linear.inverse() * (point - at);
+        let in_box = |k: u32| {
+            let (c, h) = (&t.clusters[k as usize], t.clusters[k as usize].half_extent.as_dvec3());
+            c.center.as_dvec3() + turn(c) * (turn(c).inverse() * (q - c.center.as_dvec3())).clamp(-h, h)
+        };
+        let (mut places, mut stack) = (Vec::new(), vec![e.cluster]);
+        while let Some(cluster) = stack.pop() {
+            if let Some([left, right]) = t.children(cluster) {
+                let (to_left, to_right) = (in_box(left).distance(q), in_box(right).distance(q));
+                let slack = 1e-5;
+                stack.extend((to_right <= to_left + slack).then_some(right));
+                stack.extend((to_left <= to_right + slack).then_some(left));
+                continue;
+            }
+            let c = &t.clusters[cluster as usize];
+            places.push(if count(c) > 1 {
+                (linear * in_box(cluster) + at).as_vec3()
+            } else {
+                let corners = t.corners(t.triangle_at(inst, c.first_face));
+                nearest(point, corners).lerp(corners.iter().sum::<DVec3>() / 3.0, 0.05).as_vec3()
+            });
+        }
+        places
+    };
+    t.rules.iter().map(laid).collect()
+}
+
+/// One such place for each node.
+pub fn nodes(t: &Tables, e: &FaceElement) -> Vec<Vec3> {
+    places_of_nodes(t, e).iter().map(|places| places[0]).collect()
+}
+
+/// `lib/cluster_basis.glsl`.
+pub fn basis(k: usize, uv: DVec2) -> f64 {
+    let s = 2.0 * uv - 1.0;
+    let p = |degree: u32, x: f64| match degree {
+        0 => 1.0,
+        1 => 3f64.sqrt() * x,
+        2 => 5f64.sqrt() * 0.5 * (3.0 * x * x - 1.0),
+        _ => 7f64.sqrt() * 0.5 * x * (5.0 * x * x - 3.0),
+    };
+    let (u, v) = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3)][k];
+    p(u, s.x) * p(v, s.y)
+}
+
+/// Mean over the square, exact for degree 9 in each variable.
+fn mean(f: impl Fn(DVec2) -> DVec3) -> DVec3 {
+    let (near, far) =
+        ((5.0 - 2.0 * (10f64 / 7.0).sqrt()).sqrt() / 3.0, (5.0 + 2.0 * (10f64 / 7.0).sqrt()).sqrt() / 3.0);
+    let (heavy, light) = ((322.0 + 13.0 * 70f64.sqrt()) / 1800.0, (322.0 - 13.0 * 70f64.sqrt()) / 1800.0);
+    let line = [(-far, light), (-near, heavy), (0.0, 128.0 / 450.0), (near, heavy), (far, light)];
+    let mut sum = DVec3::ZERO;
+    for (u, wu) in line {
+        for (v, wv) in line {
+            sum += f(0.5 + 0.5 * DVec2::new(u, v)) * (wu * wv);
+        }
+    }
+    sum
+}
+
+/// Coefficients on the functions of `to` of a function that has `values` on those of `from`.   [Gobbetti2003 3.3.4]
+pub fn rebased(from: &FaceElement, to: &FaceElement, values: &[DVec3], functions: usize) -> Vec<DVec3> {
+    let at = |uv: DVec2| -> DVec3 {
+        let place = plane_coordinates(from, plane_point(to, uv));
+        values.iter().enumerate().map(|(k, &v)| basis(k, place) * v).sum()
+    };
+    (0..functions).map(|k| mean(|uv| basis(k, uv) * at(uv))).collect()
+}
+
+/// Coefficient on function `k` of the parent of what a child has on its own functions, over the child's square.
+pub fn pulled(parent: &FaceElement, child: &FaceElement, values: &[DVec3], k: usize) -> DVec3 {
+    mean(|uv| {
+        let value: DVec3 = values.iter().enumerate().map(|(j, &v)| basis(j, uv) * v).sum();
+        basis(k, plane_coordinates(parent, plane_point(child, uv))) * value
+    })
+}
+
+/// What a child gets of its parent's vectors: by change of basis, per channel, where its half-space has the mean.
+pub fn pushed(parent: &FaceElement, child: &FaceElement, vectors: &[Vectors]) -> Vec<Vectors> {
+    let mut out = vec![[DVec3::ZERO; 3]; vectors.len()];
+    for c in 0..3 {
+        let of_channel: Vec<DVec3> = vectors.iter().map(|v| v[c]).collect();
+        let values = rebased(parent, child, &of_channel, vectors.len());
+        if values[0].dot(child.axis_z.as_dvec3()) > 0.0 {
+            values.iter().zip(&mut out).for_each(|(&value, out)| out[c] = value);
+        }
+    }
+    out
+}
+
+pub fn vector_area(e: &FaceElement) -> f64 {
+    f64::from(e.facing[4] - e.facing[5]).max(0.0)
+}
