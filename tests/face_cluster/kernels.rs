@@ -5,9 +5,8 @@ use crate::grown::{FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, as_words, check, flat,
 use crate::pair_twins;
 use crate::twins::{self, NONE, Vectors};
 use glam::{DVec3, Mat3, UVec2, Vec3};
-use linklight::gpu::Buffer;
 use linklight::gpu::shaders::methods::face_cluster as passes;
-use linklight::gpu::shaders::types::{FaceElement, LeafElement};
+use linklight::gpu::shaders::types::FaceElement;
 
 fn numbers(e: &FaceElement) -> Vec<f32> {
     let mut out = Vec::new();
@@ -378,82 +377,5 @@ fn children_inherit_light() {
         let expected: Vec<i32> =
             (0..count * FUNCTIONS * 9).map(|i| if i < made * FUNCTIONS * 9 { 7 } else { 0 }).collect();
         assert!(g.read(&arriving) == expected);
-    }
-}
-
-#[test]
-fn leaves_are_numbered_found_and_kept() {
-    let g = grown(80);
-    let (p, count) = (g.method.placement(), g.elements.len());
-    let triangle_count = g.tables.triangles.len();
-    let (elements, flags) = (g.table(&g.elements), g.table(&vec![9u32; count]));
-    let mut recorder = g.context.recorder("test").unwrap();
-    let params = passes::FlagLeavesParams { element_count: count as u32 };
-    recorder.dispatch(&passes::FlagLeaves { elements: &elements, leaf_indices: &flags, params }, count);
-    recorder.submit().unwrap();
-    let leaves = g.leaves();
-    let expected: Vec<u32> = (0..count).map(|e| u32::from(leaves.contains(&e))).collect();
-    assert_eq!(g.read(&flags), expected);
-
-    let numbers: Vec<u32> = (0..count).map(|e| leaves.iter().filter(|&&leaf| leaf < e).count() as u32).collect();
-    let (numbered, found) = (g.table(&numbers), g.table(&vec![UVec2::ZERO; triangle_count]));
-    let mut random = Random(14);
-    let light = [0, 1].map(|_| random_vectors(&mut random, count * FUNCTIONS));
-    let tables = [0, 1].map(|k| g.table(&as_words(&light[k])));
-    let kept: Buffer<LeafElement> = g.context.buffer("test/leaves", leaves.len()).unwrap();
-    let halves = [0, 1].map(|_| g.context.buffer("test/halves", leaves.len() * FUNCTIONS).unwrap());
-    let unit = 1.0 / 512.0;
-    let mut recorder = g.context.recorder("test").unwrap();
-    recorder.dispatch(
-        &passes::Locate {
-            elements: &elements,
-            triangle_places: &p.places,
-            triangle_roots: &p.triangle_roots,
-            leaf_indices: &numbered,
-            triangle_leaves: &found,
-            params: passes::LocateParams { triangle_count: triangle_count as u32 },
-        },
-        triangle_count,
-    );
-    recorder.dispatch(
-        &passes::KeepLeaves {
-            elements: &elements,
-            leaf_indices: &numbered,
-            direct_irradiance: &tables[0],
-            indirect_irradiance: &tables[1],
-            leaves: &kept,
-            leaf_direct: &halves[0],
-            leaf_indirect: &halves[1],
-            params: passes::KeepLeavesParams {
-                element_count: count as u32,
-                functions: FUNCTIONS as u32,
-                inverse_unit: 1.0 / unit,
-            },
-        },
-        count,
-    );
-    recorder.submit().unwrap();
-    // Among the leaves of a side, the one whose places have the triangle's.
-    for (triangle, sides) in g.read(&found).iter().enumerate() {
-        let place = g.tables.places[triangle];
-        for (side, is_back) in [(sides.x, 0), (sides.y, 1)] {
-            let holds = |&(_, e): &(usize, &usize)| {
-                let e = &g.elements[*e];
-                let inst = &g.tables.instances[e.instance as usize];
-                inst.is_back == is_back && place >= e.first_place && place < e.first_place + e.place_count
-            };
-            let expected = leaves.iter().enumerate().find(holds).map_or(NONE, |(number, _)| number as u32);
-            assert_eq!(side, expected, "triangle {triangle}");
-        }
-    }
-    for (leaf, &e) in g.read(&kept).iter().zip(&leaves) {
-        let element = &g.elements[e];
-        assert_eq!((leaf.center, leaf.axis_x, leaf.axis_y), (element.center, element.axis_x, element.axis_y));
-        assert_eq!(leaf.half_extent, element.half_extent.truncate());
-    }
-    for (halves, light) in halves.iter().zip(&light) {
-        let found: Vec<f32> = g.read(halves).iter().flat_map(|h| crate::fixture::of_halves(h, unit)).collect();
-        let expected = leaves.iter().flat_map(|e| light[e * FUNCTIONS..][..FUNCTIONS].iter().map(vectors));
-        check("half floats", &found, &flat(&expected.collect::<Vec<_>>()), 5e-4);
     }
 }

@@ -7,6 +7,7 @@ mod clusters;
 mod fixture;
 mod grown;
 mod kernels;
+mod leaves;
 mod pair_twins;
 mod pairs;
 mod physics;

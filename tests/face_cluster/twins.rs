@@ -167,7 +167,7 @@ pub fn basis(k: usize, uv: DVec2) -> f64 {
 }
 
 /// Mean over the square, exact for degree 9 in each variable.
-fn mean(f: impl Fn(DVec2) -> DVec3) -> DVec3 {
+pub fn mean(f: impl Fn(DVec2) -> DVec3) -> DVec3 {
     let (near, far) =
         ((5.0 - 2.0 * (10f64 / 7.0).sqrt()).sqrt() / 3.0, (5.0 + 2.0 * (10f64 / 7.0).sqrt()).sqrt() / 3.0);
     let (heavy, light) = ((322.0 + 13.0 * 70f64.sqrt()) / 1800.0, (322.0 - 13.0 * 70f64.sqrt()) / 1800.0);

@@ -105,6 +105,8 @@ crate::settings! {
         shading: Shading = Shading::Pixel, paper "vertex; pixel announced";
         /// GGX alpha of the narrowest lobe: one direction a channel stands for all light.
         least_alpha: f32 = 0.2, range 0.001..=1.0, paper "moderately glossy: a Phong exponent of 10, alpha 0.41";
+        /// Make light meet at the corners of leaves: the mean of all that meet there, bilinear in between.
+        smooth_corners: bool = false, paper "not done; named as Willmott's post-pass";
         /// What the picture shows.
         show: Shown = Shown::Light, paper "light, and leaf clusters";
     }

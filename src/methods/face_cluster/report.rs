@@ -26,6 +26,7 @@ pub struct Report {
     pub solution_bytes: u64,
     /// Elements with all tables that shooting needs; given back after it.
     pub working_bytes: u64,
+    /// Without finding every triangle's leaf, which is the display's and grows with the model.
     pub solve_seconds: f64,
 }
 

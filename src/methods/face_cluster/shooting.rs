@@ -108,9 +108,8 @@ impl FaceClusters {
             self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Indirect, threshold, most: unshot })?;
         }
         stage.watch.step("light", count, count)?;
-        self.locate(context, stage)?;
         self.report.solve_seconds = clock.elapsed().as_secs_f64();
-        Ok(())
+        self.locate(context, stage)
     }
 
     /// What the direct light left to shoot, W.

@@ -15,6 +15,9 @@ use glam::Vec3;
 /// The largest half float that all light together may come to: four times less than there are.
 const MOST_UNITS: f32 = 16384.0;
 
+/// Functions of light that is bilinear between corners.
+const CORNERS: u32 = 4;
+
 /// Light on leaves; their number is that of [`super::State::triangle_leaves`].
 pub struct Solution {
     pub leaves: Buffer<LeafElement>,
@@ -70,7 +73,9 @@ impl FaceClusters {
 
     /// What is to be shown of what was solved and located; everything else is given back.
     pub fn keep(&mut self, context: &Context) -> Result<Solution, FaceClusterError> {
-        let (s, functions) = (&self.state, self.settings.irradiance_basis.functions());
+        let (s, own) = (&self.state, self.settings.irradiance_basis.functions());
+        let is_smooth = self.settings.smooth_corners;
+        let functions = if is_smooth { CORNERS } else { own };
         let leaves = self.report.leaves as usize;
         let unit = (self.most_light / MOST_UNITS).max(f32::MIN_POSITIVE);
         let solution = Solution {
@@ -92,11 +97,25 @@ impl FaceClusters {
             leaf_indirect: &solution.indirect,
             params: passes::KeepLeavesParams {
                 element_count: self.report.elements,
-                functions,
+                // Smoothed light has a kernel of its own.
+                functions: if is_smooth { 0 } else { own },
                 inverse_unit: 1.0 / unit,
             },
         };
         recorder.dispatch(&pass, self.report.elements);
+        if is_smooth {
+            let pass = passes::SmoothLeaves {
+                elements: &s.elements,
+                leaf_indices: &s.leaf_indices,
+                direct_irradiance: &s.direct,
+                indirect_irradiance: &s.indirect,
+                leaf_direct: &solution.direct,
+                leaf_indirect: &solution.indirect,
+                params: passes::SmoothLeavesParams { element_count: self.report.elements, inverse_unit: 1.0 / unit },
+                constants: passes::SmoothLeavesConstants { irradiance_functions: own },
+            };
+            recorder.dispatch(&pass, self.report.elements);
+        }
         recorder.submit()?;
         self.report.solution_bytes = solution.size_bytes();
         self.state.shrink(context, &self.settings, self.placement.instance_count)?;

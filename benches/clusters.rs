@@ -1,0 +1,176 @@
+//! Face-cluster radiosity in figures, as ratios of one run: clustering by size against N log N; solving one gallery at
+//! growing triangle counts; showing its solution against rasterising the same mesh. Fastest of several rounds.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use glam::UVec2;
+use linklight::display::g_buffer::GBuffer;
+use linklight::display::irradiance_vector;
+use linklight::display::shadow_maps::ShadowMaps;
+use linklight::gpu::{Context, Options};
+use linklight::methods::face_cluster::{FaceClusters, Report, Settings, Stage};
+use linklight::scene::camera::View;
+use linklight::scene::environment::Environment;
+use linklight::scene::geometry::Geometry;
+use linklight::scene::pose::Pose;
+use linklight::scene::{self, LoadOptions, Scene, deform};
+use linklight::stages::bvh::Bvh;
+use linklight::stages::film::Film;
+use linklight::stages::work::Unwatched;
+use linklight::stages::world::World;
+use std::time::Duration;
+
+const ROUNDS: usize = 3;
+const BOUNCES: u32 = 4;
+const MEMORY: u64 = 8 << 30;
+const SIZE: UVec2 = UVec2::new(480, 300);
+/// Triangles asked of the gallery: the paper's range.
+const TRIANGLES: [u32; 4] = [160_000, 400_000, 800_000, 1_500_000];
+
+fn gallery(triangles: u32) -> Scene {
+    let options = LoadOptions { max_memory_bytes: MEMORY, ..LoadOptions::default() };
+    scene::open(&format!("builtin:gallery?triangles={triangles}"), &options).unwrap()
+}
+
+/// Milliseconds of the passes of a picture: those that rasterise, and all.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    raster: f64,
+    all: f64,
+}
+
+/// What one size of the gallery costs.
+struct Row {
+    report: Report,
+    solve: f64,
+    shown: Shown,
+}
+
+fn row(context: &Context, triangles: u32) -> Row {
+    let scene = gallery(triangles);
+    let pose = Pose::rest(&scene);
+    let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
+    let vertices = deform::world_vertices(&geometry, &pose);
+    let (bounds, positions) = (vertices.bounds().unwrap(), vertices.positions);
+    let environment = Environment::default();
+    let world = World::new(context, &scene, &geometry, &pose, &environment, false).unwrap();
+    let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
+    let stage = Stage {
+        scene: &scene,
+        geometry: &geometry,
+        rest_positions: &positions,
+        pose: &pose,
+        bounds,
+        environment: &environment,
+        world: &world,
+        bvh: &bvh,
+        cluster_cache: None,
+        watch: &Unwatched,
+    };
+    let mut method = FaceClusters::prepare(context, &stage, Settings::default()).unwrap();
+    let view = View::of_scene(&scene, &pose, None, Some(bounds), SIZE).unwrap();
+    let (film, g_buffer) =
+        (Film::new(context, SIZE.x, SIZE.y).unwrap(), GBuffer::new(context, SIZE.x, SIZE.y).unwrap());
+    let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
+    let (mut solve, mut shown) = (f64::INFINITY, Shown { raster: f64::INFINITY, all: f64::INFINITY });
+    // The first round is the driver's, to compile, and the pool's, to grow.
+    for round in 0..=ROUNDS {
+        method.solve(context, &stage, BOUNCES).unwrap();
+        let solution = method.keep(context).unwrap();
+        context.take_records();
+        let mut recorder = context.recorder("frame").unwrap();
+        let light = method.light(&solution);
+        irradiance_vector::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, &view, 1, &film);
+        recorder.submit().unwrap();
+        let records = context.take_records();
+        let ms = |is_own: &dyn Fn(&str) -> bool| -> f64 {
+            let own = records.iter().filter(|record| is_own(&record.name));
+            own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
+        };
+        if round > 0 {
+            solve = solve.min(method.report().solve_seconds);
+            let now = Shown { raster: ms(&|name| name.ends_with("visible_triangles")), all: ms(&|_| true) };
+            if now.all < shown.all {
+                shown = now;
+            }
+        }
+    }
+    Row { report: method.report().clone(), solve, shown }
+}
+
+fn by_size(_: &mut Criterion) {
+    let context = Context::new(Options::default()).expect("the benchmark needs a Vulkan device");
+    println!("device {}", context.info().name);
+    println!(
+        "triangles  clustering s (M/s)   bytes/cluster  bytes/N  depth | solve s  leaves  transfers  solution MB | raster ms  picture ms"
+    );
+    let rows: Vec<Row> = TRIANGLES.iter().map(|&triangles| row(&context, triangles)).collect();
+    for Row { report: r, solve, shown } in &rows {
+        let n = f64::from(r.triangles);
+        // Triangles of three indices, and half as many vertices of three coordinates.
+        let model = r.cluster_bytes as f64 / n + 12.0 + 6.0;
+        println!(
+            "{:9}  {:8.2} ({:.3})  {:13.1}  {model:7.1}  {:5} | {solve:7.2}  {:6}  {:9}  {:11.2} | {:9.1}  {:10.1}",
+            r.triangles,
+            r.clustering_seconds,
+            1e-6 * n / r.clustering_seconds,
+            r.cluster_bytes as f64 / r.clusters as f64,
+            r.tree_depth,
+            r.leaves,
+            r.transfers(),
+            1e-6 * r.solution_bytes as f64,
+            shown.raster,
+            shown.all
+        );
+    }
+    let spread = |of: &dyn Fn(&Row) -> f64| {
+        let values: Vec<f64> = rows.iter().map(of).collect();
+        values.iter().copied().fold(0.0, f64::max) / values.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let per_n_log_n = |row: &Row| {
+        let n = f64::from(row.report.triangles);
+        row.report.clustering_seconds / (n * n.log2())
+    };
+    println!(
+        "largest/smallest: solve {:.3} (goal 1.12), leaves {:.3}, clustering per N log N {:.3}",
+        spread(&|row| row.solve),
+        spread(&|row| f64::from(row.report.leaves)),
+        spread(&per_n_log_n)
+    );
+    if let Some(last) = rows.last() {
+        println!("picture / rasterising at the largest: {:.2}", last.shown.all / last.shown.raster);
+    }
+}
+
+/// A wavy sheet of so many triangles: clustering alone.
+fn clustering(c: &mut Criterion) {
+    use glam::Vec3;
+    use linklight::stages::clusters::{ClusterTree, MeshFaces};
+    let mut group = c.benchmark_group("clustering");
+    group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(5));
+    for side in [64u32, 128, 256] {
+        let at = |i: u32| i as f32 / side as f32;
+        let positions: Vec<Vec3> = (0..(side + 1) * (side + 1))
+            .map(|k| (at(k % (side + 1)), at(k / (side + 1))))
+            .map(|(x, y)| Vec3::new(x, y, 0.1 * (9.0 * x).sin() * (7.0 * y).cos()))
+            .collect();
+        let corner = |k: u32| k / side * (side + 1) + k % side;
+        let triangles: Vec<[u32; 3]> = (0..side * side)
+            .map(corner)
+            .flat_map(|a| [[a, a + 1, a + side + 2], [a, a + side + 2, a + side + 1]])
+            .collect();
+        let (gray, dark) = (vec![Vec3::splat(0.5); triangles.len()], vec![Vec3::ZERO; triangles.len()]);
+        let mesh = MeshFaces {
+            positions: &positions,
+            triangles: &triangles,
+            albedo: &gray,
+            reflectance: &gray,
+            emission: &dark,
+        };
+        group.throughput(Throughput::Elements(triangles.len() as u64));
+        group.bench_function(BenchmarkId::new("faces", triangles.len()), |b| b.iter(|| ClusterTree::build(&mesh)));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, clustering, by_size);
+criterion_main!(benches);
