@@ -83,7 +83,7 @@ fn row(context: &Context, triangles: u32) -> Row {
         recorder.submit().unwrap();
         let records = context.take_records();
         let ms = |is_own: &dyn Fn(&str) -> bool| -> f64 {
-            let own = records.iter().filter(|record| is_own(&record.name));
+            let own = records.iter().filter(|record| is_own(record.name));
             own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
         };
         if round > 0 {

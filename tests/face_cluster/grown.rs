@@ -28,9 +28,14 @@ pub struct Grown {
 
 /// A floor, a wavy sheet with two sides above it, a board between them, and two lamps.
 pub fn grown(count: usize) -> Grown {
+    grown_over(count, [0.2, 3.0])
+}
+
+/// With waves so high and so many radians a metre.
+pub fn grown_over(count: usize, [height, waves]: [f32; 2]) -> Grown {
     let context = TestContext::new();
-    let mut sheet = parallelogram(Vec3::new(-1.0, 0.9, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 10, 1);
-    sheet.positions.iter_mut().for_each(|p| p.y += 0.2 * (3.0 * p.x).sin() * (2.0 * p.z).cos());
+    let mut sheet = parallelogram(Vec3::new(-1.0, 1.2, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 10, 1);
+    sheet.positions.iter_mut().for_each(|p| p.y += height * (waves * p.x).sin() * (2.0 * p.z).cos());
     let floor = parallelogram(Vec3::new(-1.0, 0.0, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 8, 0);
     let board = parallelogram(Vec3::new(-0.3, 0.4, 0.5), Vec3::X * 0.7, Vec3::NEG_Z * 0.9, 3, 2);
     let mut materials =

@@ -135,6 +135,7 @@ fn past_cluster(
 #[derive(Clone, Copy)]
 pub struct Way {
     pub threshold: f64,
+    pub bent_light: f64,
     pub rays_per_node: usize,
     pub functions: usize,
     pub by: Blockers,
@@ -173,13 +174,23 @@ impl Reaching {
     fn decided(
         mut self,
         t: &Tables,
-        a: &FaceElement,
+        (a, shooter): (&FaceElement, Option<&FaceElement>),
         way: &Way,
         free: impl Fn(usize) -> f64,
         (rays, split, node): (usize, u32, usize),
     ) -> Outcome {
-        let stake = f64::from(a.most_albedo) * self.greatest.iter().copied().fold(0.0, f64::max) / way.threshold;
+        let most = self.greatest.iter().copied().fold(0.0, f64::max);
+        let stake = f64::from(a.most_albedo) * most / way.threshold;
+        let bend = most / (way.bent_light * f64::from(a.area));
         let mut quotients = vec![stake];
+        let bends = |e: &FaceElement| vector_area(e) < 0.7 * f64::from(e.area) && t.children(e.cluster).is_some();
+        let bent = [(Some(a), SPLIT_RECEIVER), (shooter, SPLIT_SHOOTER)].into_iter();
+        if let Some((_, decision)) = bent.into_iter().find(|(e, _)| e.is_some_and(bends)) {
+            quotients.push(bend);
+            if bend > 1.0 {
+                return Outcome::new(decision, quotients);
+            }
+        }
         let is_small = stake <= 1.0;
         let shares: Vec<f64> = (0..t.receiver_nodes).map(|r| free(if is_small { node } else { r })).collect();
         let rays = if is_small { 1 } else { rays };
@@ -208,7 +219,7 @@ impl Reaching {
             let off = |r: usize| (said(r) - self.least[r]).max(self.greatest[r] - said(r));
             let error = (0..t.receiver_nodes).map(off).fold(0.0, f64::max);
             quotients.push(f64::from(a.most_albedo) * error / way.threshold);
-            if quotients[1] > 1.0 {
+            if *quotients.last().unwrap() > 1.0 {
                 return Outcome::new(split, quotients);
             }
         }
@@ -295,7 +306,7 @@ pub fn transport(
         (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
-    reaching.decided(t, a, way, free, (t.receiver_nodes * way.rays_per_node, split, turn % t.receiver_nodes))
+    reaching.decided(t, (a, Some(b)), way, free, (t.receiver_nodes * way.rays_per_node, split, turn % t.receiver_nodes))
 }
 
 /// `transport_lights`: a directional light's or a point light's.
@@ -340,5 +351,5 @@ pub fn transport_light(
         visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
     };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
-    reaching.decided(t, a, way, free, (t.receiver_nodes, split, a.cluster as usize % t.receiver_nodes))
+    reaching.decided(t, (a, None), way, free, (t.receiver_nodes, split, a.cluster as usize % t.receiver_nodes))
 }

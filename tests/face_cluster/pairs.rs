@@ -1,12 +1,15 @@
 //! The kernels that decide pairs against their twins: what is split, and what arrives.
 
 use crate::common::Random;
-use crate::grown::{FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, check, flat, grown};
+use crate::grown::{FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, check, flat, grown_over};
 use crate::pair_twins::{self, Blockers, Outcome, Way};
 use glam::{UVec2, Vec3};
 use linklight::gpu::Buffer;
 use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::PoolCounters;
+
+/// W/m2: more than some bent receivers of the scene get, and less than others.
+const BENT_LIGHT: f64 = 0.3;
 
 /// Runs all pairs that are clear in one step; returns decisions and sums beside the twin's.
 fn compare_outcomes(
@@ -43,7 +46,7 @@ fn compare_outcomes(
 
 #[test]
 fn pairs_are_transported_or_split() {
-    let g = grown(90);
+    let g = grown_over(90, [0.5, 5.0]);
     let mut random = Random(13);
     let count = g.elements.len();
     let unshot: Vec<Vec<Vec3>> = (0..count)
@@ -59,7 +62,7 @@ fn pairs_are_transported_or_split() {
     for (by, rays_per_node, threshold, step) in
         [(Blockers::Triangles, 1, 2e-3, 1), (Blockers::Triangles, 3, 2e-2, 3), (Blockers::Clusters, 1, 5e-3, 3)]
     {
-        let way = Way { threshold, rays_per_node, functions: FUNCTIONS, by };
+        let way = Way { threshold, bent_light: BENT_LIGHT, rays_per_node, functions: FUNCTIONS, by };
         let pairs: Vec<UVec2> = pairs.iter().step_by(step).copied().collect();
         let of = |pair: &UVec2| {
             let pair = [pair.x as usize, pair.y as usize];
@@ -93,6 +96,7 @@ fn pairs_are_transported_or_split() {
                 decisions,
                 params: passes::TransportParams {
                     threshold: threshold as f32,
+                    bent_light: BENT_LIGHT as f32,
                     units,
                     rays_per_node: rays_per_node as u32,
                 },
@@ -113,14 +117,15 @@ fn pairs_are_transported_or_split() {
 
 #[test]
 fn light_of_lamps_is_transported_or_split() {
-    let g = grown(120);
+    let g = grown_over(120, [0.5, 5.0]);
     let (p, world, units) = (g.method.placement(), &g.fixture.world, 1e7f32);
     let lights = g.read(&world.lights);
     let pairs: Vec<UVec2> =
         (0..g.elements.len() as u32).flat_map(|e| [0, 1].map(|l| UVec2::new(e, l | 1 << 31))).collect();
     let flat_nodes: Vec<Vec3> = g.nodes.iter().flatten().copied().collect();
     let (threshold, far, ray_offset) = (0.05, 10.0f32, 1e-4f32);
-    let way = Way { threshold, rays_per_node: 1, functions: FUNCTIONS, by: Blockers::Triangles };
+    let way =
+        Way { threshold, bent_light: BENT_LIGHT, rays_per_node: 1, functions: FUNCTIONS, by: Blockers::Triangles };
     let of = |pair: &UVec2| {
         let (e, l) = (pair.x as usize, (pair.y & !(1 << 31)) as usize);
         let reach = [f64::from(far), f64::from(ray_offset)];
@@ -152,7 +157,13 @@ fn light_of_lamps_is_transported_or_split() {
             taken_pairs: taken,
             lights: &world.lights,
             decisions,
-            params: passes::TransportLightsParams { threshold: threshold as f32, units, far, ray_offset },
+            params: passes::TransportLightsParams {
+                threshold: threshold as f32,
+                bent_light: BENT_LIGHT as f32,
+                units,
+                far,
+                ray_offset,
+            },
             constants: passes::TransportLightsConstants {
                 receiver_nodes: g.tables.receiver_nodes as u32,
                 shooter_nodes: SHOOTER.nodes().len() as u32,

@@ -14,6 +14,7 @@ layout(set = 0, binding = 16, scalar) writeonly buffer Decisions { uint decision
 layout(constant_id = 4) const uint RADIOSITY_FUNCTIONS = 1u;
 layout(push_constant, scalar) uniform Params {
     float threshold;    // W, of a transfer's error
+    float bent_light;   // W/m2, that a bent receiver may get as a whole
     float units;        // per W/m2
     uint rays_per_node;
 } params;
@@ -103,6 +104,13 @@ void main()
         // No surface receives more than a hemisphere of the shooter's light.
         if (sum > 1.0) at_nodes[r] /= sum;
         greatest_of_all = max(greatest_of_all, greatest[r]);
+    }
+    // Nothing is kept from behind the mean normal of a receiver, and nothing sent from behind a shooter's: where that is
+    // too much light, faces must be met apart, small as they are.
+    bool splits_a = is_bent(a) && can_split(a), splits_b = is_bent(b) && can_split(b);
+    if ((splits_a || splits_b) && greatest_of_all > params.bent_light * a.area) {
+        decisions[i] = splits_a ? SPLIT_RECEIVER : SPLIT_SHOOTER;
+        return;
     }
     // So little that even an error of all of it does not matter needs no more than one ray.
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;

@@ -15,6 +15,7 @@ layout(set = 0, binding = 15, scalar) readonly buffer Lights { Light lights[]; }
 layout(set = 0, binding = 16, scalar) writeonly buffer Decisions { uint decisions[]; };
 layout(push_constant, scalar) uniform Params {
     float threshold;    // W, of a transfer's error
+    float bent_light;   // W/m2, that a bent receiver may get as a whole
     float units;        // per W/m2
     float far;          // metres: beyond everything
     float ray_offset;   // metres
@@ -47,6 +48,11 @@ void main()
         greatest[r] = most(arrives) * most_projected_area(a, direction);
         greatest_of_all = max(greatest_of_all, greatest[r]);
         at_nodes[r] = dot(direction, a.axis_z) > 0.0 ? outerProduct(direction, arrives) : mat3(0.0);
+    }
+    // Nothing is kept from behind the mean normal: what many faces look at must find them apart, small as they are.
+    if (is_bent(a) && can_split(a) && greatest_of_all > params.bent_light * a.area) {
+        decisions[i] = SPLIT_RECEIVER;
+        return;
     }
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
     uint turn = a.cluster % RECEIVER_NODES;

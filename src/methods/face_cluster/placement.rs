@@ -59,6 +59,8 @@ pub struct Placement {
     pub depth: u32,
     /// m2; clusters are not split below.
     pub least_area: f32,
+    /// Of all instances, m2.
+    pub area: f32,
     /// Emitted by all instances, W.
     pub emitted_power: Vec3,
 }
@@ -132,6 +134,7 @@ impl Placement {
             placed_clusters,
             depth: upper.depth,
             least_area,
+            area: total_area as f32,
             emitted_power,
             trees,
         })

@@ -41,6 +41,8 @@ pub(super) struct LightPass<'a> {
     pub kept: Kept,
     /// W, of a transfer's error.
     pub threshold: f32,
+    /// W/m2, that a bent receiver may get as a whole.
+    pub bent_light: f32,
     /// W/m2, the most that can arrive anywhere.
     pub most: f32,
 }
@@ -59,6 +61,8 @@ impl FaceClusters {
         let distant = lights::distant_emitters(stage.environment, self.settings.environment_directions);
         // An error is judged against the light it is an error of: a sun's power beside a candle's says nothing.
         let threshold = |power: Vec3| self_threshold * power.max_element();
+        let per_threshold = self.settings.bent_light / (self_threshold * self.placement.area.max(f32::MIN_POSITIVE));
+        let bent = |threshold: f32| per_threshold * threshold;
         let across = PI * 0.25 * diagonal * diagonal;
         let count = u64::from(bounces) + 3;
 
@@ -71,7 +75,11 @@ impl FaceClusters {
             let shooters = Shooters::Lights(&stage.world.lights, stage.world.light_count);
             let (name, most) = ("punctual".to_owned(), most.sum());
             let threshold = threshold(punctual_power(stage, across));
-            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::No, threshold, most })?;
+            self.shoot(
+                context,
+                stage,
+                &LightPass { name, shooters, kept: Kept::No, threshold, bent_light: bent(threshold), most },
+            )?;
         }
         stage.watch.step("light", 1, count)?;
         if !distant.is_empty() {
@@ -80,14 +88,29 @@ impl FaceClusters {
             let shooters = Shooters::Lights(&table, distant.len() as u32);
             let name = "environment".to_owned();
             let threshold = threshold(distant.iter().map(|light| across * light.intensity).sum());
-            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Direct, threshold, most })?;
+            self.shoot(
+                context,
+                stage,
+                &LightPass { name, shooters, kept: Kept::Direct, threshold, bent_light: bent(threshold), most },
+            )?;
         }
         stage.watch.step("light", 2, count)?;
         let emitted = self.emit(context)?;
         if emitted > 0.0 {
             let (name, shooters) = ("direct".to_owned(), Shooters::Emission);
             let threshold = threshold(self.placement.emitted_power);
-            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Direct, threshold, most: emitted })?;
+            self.shoot(
+                context,
+                stage,
+                &LightPass {
+                    name,
+                    shooters,
+                    kept: Kept::Direct,
+                    threshold,
+                    bent_light: bent(threshold),
+                    most: emitted,
+                },
+            )?;
         }
 
         let mut first = 0.0f32;
@@ -105,7 +128,18 @@ impl FaceClusters {
             recorder.fill(&self.state.next_unshot, 0);
             recorder.submit()?;
             let (name, shooters) = (format!("bounce {bounce}"), Shooters::Unshot);
-            self.shoot(context, stage, &LightPass { name, shooters, kept: Kept::Indirect, threshold, most: unshot })?;
+            self.shoot(
+                context,
+                stage,
+                &LightPass {
+                    name,
+                    shooters,
+                    kept: Kept::Indirect,
+                    threshold,
+                    bent_light: bent(threshold),
+                    most: unshot,
+                },
+            )?;
         }
         stage.watch.step("light", count, count)?;
         self.report.solve_seconds = clock.elapsed().as_secs_f64();

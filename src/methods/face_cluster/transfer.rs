@@ -158,7 +158,7 @@ impl FaceClusters {
                 }
             };
         }
-        let (threshold, alpha_test) = (pass.threshold, world.has_holes);
+        let (threshold, bent_light, alpha_test) = (pass.threshold, pass.bent_light, world.has_holes);
         if let Shooters::Lights(lights, _) = pass.shooters {
             let diagonal = (stage.bounds[1] - stage.bounds[0]).length().max(f32::MIN_POSITIVE);
             let (far, ray_offset) = (2.0 * diagonal, RAY_OFFSET * diagonal);
@@ -169,7 +169,7 @@ impl FaceClusters {
                 alpha_test,
                 clusters_block,
             };
-            let params = passes::TransportLightsParams { threshold, units, far, ray_offset };
+            let params = passes::TransportLightsParams { threshold, bent_light, units, far, ray_offset };
             recorder.dispatch_indirect(&deciding!(TransportLights, lights, params, constants), &queue.groups, 0);
         } else {
             let constants = passes::TransportConstants {
@@ -180,7 +180,8 @@ impl FaceClusters {
                 alpha_test,
                 clusters_block,
             };
-            let params = passes::TransportParams { threshold, units, rays_per_node: self.settings.rays_per_node };
+            let params =
+                passes::TransportParams { threshold, bent_light, units, rays_per_node: self.settings.rays_per_node };
             recorder.dispatch_indirect(&deciding!(Transport, unshot: &s.unshot, params, constants), &queue.groups, 0);
         }
     }
