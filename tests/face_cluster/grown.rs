@@ -113,7 +113,10 @@ pub fn difference(found: &[f32], expected: &[f64], tolerance: f64) -> Option<Str
     if found.len() != expected.len() {
         return Some(format!("{} values, expected {}", found.len(), expected.len()));
     }
-    let wrong = |(_, (f, e)): &(usize, (&f32, &f64))| !((f64::from(**f) - **e).abs() <= tolerance * scale);
+    let wrong = |(_, (f, e)): &(usize, (&f32, &f64))| {
+        let off = (f64::from(**f) - **e).abs();
+        off.is_nan() || off > tolerance * scale
+    };
     let (at, (f, e)) = found.iter().zip(expected).enumerate().find(wrong)?;
     Some(format!("value {at} is {f}, expected {e} (of {scale})"))
 }
