@@ -12,7 +12,7 @@ use linklight::display::shadow_maps::ShadowMaps;
 use linklight::gpu::shaders::surface_maps::{CubeRays, CubeRaysParams};
 use linklight::gpu::shaders::types::{Hit, Ray, SurfaceMapQuery};
 use linklight::gpu::{Buffer, Context, Options, Recorder};
-use linklight::methods::surface_shadow_maps::{Settings, Stage, SurfaceShadowMaps};
+use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps};
 use linklight::report::tonemap::ToneSettings;
 use linklight::scene::camera::View;
 use linklight::scene::environment::Environment;
@@ -58,6 +58,8 @@ fn surface_maps(criterion: &mut Criterion) {
         scene: &scene,
         geometry: &geometry,
         positions: &vertices.positions,
+        rest_positions: &vertices.positions,
+        pose: &pose,
         bounds,
         world: &world,
         tracer,
@@ -105,7 +107,7 @@ fn making(context: &Context, method: &SurfaceShadowMaps, maps: &SurfaceMaps, tra
         );
         trace::closest_hit(recorder, tracer, &rays, &hits, rays.len());
     });
-    let input = MapInput { atlas: &method.atlas, tracer: *tracer, bounds, content: &[], cache: None };
+    let input = MapInput { atlas: &method.atlas, tracer: *tracer, apart: None, bounds, content: &[], cache: None };
     let options = MapOptions { resolution, sequence: Sequence::Spiral, bias: 1.0 };
     let start = Instant::now();
     let made = SurfaceMaps::new(context, input, options, &Unwatched).unwrap();
@@ -179,7 +181,11 @@ fn queries(
 
 /// Bounces over texels and the gather of a picture, by maps and by rays.
 fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh: &Bvh, pose: &Pose) {
-    let solve = |bounces| seconds(context, |recorder| method.solve(recorder, stage.world, &stage.tracer, bounces));
+    let solve = |bounces| {
+        seconds(context, |recorder| {
+            method.solve(recorder, Lit { world: stage.world, tracer: stage.tracer, bvh }, bounces)
+        })
+    };
     let [direct, one, two] = [0, 1, 2].map(solve);
     let cuts = context.download(method.cut_sizes()).unwrap();
     let nodes = cuts.iter().map(|&cut| f64::from(cut)).sum::<f64>();

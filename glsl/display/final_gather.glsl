@@ -10,6 +10,8 @@
 #include "lib/random.glsl"
 #include "lib/sender_gather.glsl"
 
+float visibility(vec3 origin, vec3 target, uint leaf);
+
 // Of a pixel, means over its samples.
 struct GatherCount {
     float cut_size;     // nodes gathered from

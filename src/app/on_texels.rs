@@ -10,7 +10,7 @@ use crate::display::g_buffer::GBuffer;
 use crate::display::lightmap::{self, Lightmap, TexelLight};
 use crate::display::shadow_maps::ShadowMaps;
 use crate::gpu::Context;
-use crate::methods::surface_shadow_maps::{self, Report, SurfaceShadowMaps};
+use crate::methods::surface_shadow_maps::{self, Lit, Report, SurfaceShadowMaps};
 use crate::report::image::write_exr;
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
@@ -53,6 +53,8 @@ impl TexelsShown {
             scene: &stage.scene,
             geometry: &stage.geometry,
             positions: &positions,
+            rest_positions: &stage.rest_positions,
+            pose: &stage.pose,
             bounds: stage.bounds,
             world: &stage.world,
             tracer: stage.tracer(),
@@ -77,7 +79,8 @@ impl TexelsShown {
     pub fn solve(&self, context: &Context, stage: &Stage, bounces: u32) -> Result<&SurfaceShadowMaps, AppError> {
         let mut recorder = context.recorder("frame")?;
         recorder.scope("surface-shadow-maps", |recorder| {
-            self.method.solve(recorder, &stage.world, &stage.tracer(), bounces);
+            let lit = Lit { world: &stage.world, tracer: stage.tracer(), bvh: &stage.bvh };
+            self.method.solve(recorder, lit, bounces);
         });
         recorder.submit()?;
         Ok(&self.method)

@@ -226,6 +226,21 @@ impl FinalGather {
         let by_maps = matches!(settings.gather_visibility, Visibility::Auto | Visibility::Maps);
         let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = from.tracer;
         match (from.tracer, from.maps.filter(|_| by_maps)) {
+            (_, Some(PlacedMaps { maps, leaf_places, frame, moving: Some(moving), .. })) => gather!(
+                FinalGatherMoving,
+                FinalGatherMovingParams,
+                surfaces,
+                passes::FinalGatherMovingConstants { alpha_test: surfaces.has_holes, compact },
+                bvh_nodes: from.bvh.nodes(),
+                bvh_triangles: from.bvh.triangles(),
+                map_frame: frame,
+                run_offsets: &maps.run_offsets,
+                runs: &maps.runs,
+                map_origins: &maps.origins,
+                leaf_places: leaf_places,
+                rigid_words: &moving.words,
+                rigid_objects: &moving.present
+            ),
             (_, Some(placed)) => gather!(
                 FinalGatherMaps,
                 FinalGatherMapsParams,

@@ -19,6 +19,7 @@ pub mod environment;
 pub mod geometry;
 pub mod gltf;
 pub mod pose;
+pub mod rigid;
 pub mod shapes;
 pub mod surfaces;
 pub mod tessellate;

@@ -31,20 +31,37 @@ pub enum HiddenPartsError {
     Gpu(#[from] GpuError),
 }
 
-/// Leaves the hidden parts out of `atlas`; returns how many they were. `ray_offset` is how far rays start off the surface,
-/// metres.
+/// What the parts are hidden by.
+pub struct Seen<'a> {
+    /// One, or one for each object where they move against each other: those hide themselves alone.
+    pub tracers: &'a [Tracer<'a>],
+    /// Of each triangle; empty where there is one tracer.
+    pub triangle_objects: &'a [u32],
+    /// How far rays start off the surface, metres.
+    pub ray_offset: f32,
+}
+
+/// Leaves the hidden parts out of `atlas`; returns how many they were.
 pub fn leave_out(
     context: &Context,
-    tracer: &Tracer<'_>,
+    seen: &Seen<'_>,
     geometry: &Geometry,
     positions: &[Vec3],
     atlas: &mut Atlas,
-    ray_offset: f32,
     watch: &dyn Watch,
 ) -> Result<usize, HiddenPartsError> {
     let (points, normals) = atlas.part_points(geometry, positions);
-    let back_hits = back_hits(context, tracer, (&points, &normals), ray_offset, watch)?;
-    let kept: Vec<bool> = back_hits.iter().map(|&hits| hits < HIDDEN_FROM).collect();
+    let mut kept = vec![true; points.len()];
+    for (object, tracer) in seen.tracers.iter().enumerate() {
+        let is_own = |part: &u32| {
+            let triangle = atlas.parts[*part as usize].triangle as usize;
+            seen.triangle_objects.get(triangle).is_none_or(|&of| of as usize == object)
+        };
+        let own: Vec<u32> = (0..points.len() as u32).filter(is_own).collect();
+        let of = |values: &[Vec3]| own.iter().map(|&part| values[part as usize]).collect::<Vec<_>>();
+        let back_hits = back_hits(context, tracer, (&of(&points), &of(&normals)), seen.ray_offset, watch)?;
+        own.iter().zip(back_hits).for_each(|(&part, hits)| kept[part as usize] = hits < HIDDEN_FROM);
+    }
     let hidden = kept.iter().filter(|kept| !**kept).count();
     if hidden > 0 {
         atlas.keep_parts(geometry, positions, &kept);

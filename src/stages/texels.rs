@@ -33,24 +33,13 @@ impl Texels {
     /// Uploads the texels of `atlas` and takes the world's present materials.
     pub fn new(context: &Context, atlas: &Atlas, world: &World, ray_offset: f32) -> Result<Self, GpuError> {
         let count = atlas.texels.len();
-        let texels: Vec<AtlasTexel> = (atlas.texels.iter().enumerate())
-            .map(|(index, texel)| AtlasTexel {
-                position: texel.position,
-                normal: texel.normal,
-                side_u: texel.side_u,
-                side_v: texel.side_v,
-                first_part: texel.first_part,
-                part_count: atlas.parts_of(index).len() as u32,
-                is_back: u32::from(texel.chart >= atlas.chart_count),
-            })
-            .collect();
         let parts = atlas.parts.iter();
         let parts: Vec<AtlasPart> = parts
             .map(|part| AtlasPart { triangle: part.triangle, barycentrics: part.barycentrics, area: part.area })
             .collect();
         let texels = Self {
             count: count as u32,
-            texels: context.upload("texels/texels", &texels)?,
+            texels: context.upload("texels/texels", &receivers(atlas))?,
             albedo: context.buffer("texels/albedo", count)?,
             emission: context.buffer("texels/emission", count)?,
             roughness: context.buffer("texels/roughness", count)?,
@@ -63,6 +52,11 @@ impl Texels {
         texels.update_materials(&mut recorder, world);
         recorder.submit()?;
         Ok(texels)
+    }
+
+    /// Takes over where the same texels are now.
+    pub fn move_to(&self, context: &Context, atlas: &Atlas) -> Result<(), GpuError> {
+        context.write(&self.texels, &receivers(atlas))
     }
 
     /// Averages albedo, emission and roughness over the texels, with the world's present materials.
@@ -153,6 +147,21 @@ impl Texels {
             batch(first, texels.min(self.count - first));
         }
     }
+}
+
+/// Texels as receivers, in the atlas' order.
+fn receivers(atlas: &Atlas) -> Vec<AtlasTexel> {
+    (atlas.texels.iter().enumerate())
+        .map(|(index, texel)| AtlasTexel {
+            position: texel.position,
+            normal: texel.normal,
+            side_u: texel.side_u,
+            side_v: texel.side_v,
+            first_part: texel.first_part,
+            part_count: atlas.parts_of(index).len() as u32,
+            is_back: u32::from(texel.chart >= atlas.chart_count),
+        })
+        .collect()
 }
 
 /// Texels as senders, in the atlas' order.

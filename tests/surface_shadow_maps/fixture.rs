@@ -3,7 +3,7 @@
 use crate::common::TestContext;
 use glam::Vec3;
 use linklight::gpu::Context;
-use linklight::methods::surface_shadow_maps::{Settings, Stage, SurfaceShadowMaps};
+use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps};
 use linklight::report::tonemap::ToneSettings;
 use linklight::scene::atlas::Atlas;
 use linklight::scene::environment::Environment;
@@ -21,6 +21,8 @@ pub struct Fixture {
     pub scene: Scene,
     pub geometry: Geometry,
     pub positions: Vec<Vec3>,
+    pub rest_positions: Vec<Vec3>,
+    pub pose: Pose,
     pub bounds: [Vec3; 2],
     pub world: World,
     pub bvh: Bvh,
@@ -32,14 +34,19 @@ pub fn builtin_scene(name: &str) -> Scene {
 
 impl Fixture {
     pub fn new(context: &TestContext, scene: Scene, environment: &Environment) -> Self {
-        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
         let pose = Pose::rest(&scene);
+        Self::posed(context, scene, environment, pose)
+    }
+
+    pub fn posed(context: &TestContext, scene: Scene, environment: &Environment, pose: Pose) -> Self {
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let rest_positions = deform::world_positions(&geometry, &Pose::rest(&scene));
         let world = World::new(context, &scene, &geometry, &pose, environment, true).unwrap();
         let vertices = deform::world_vertices(&geometry, &pose);
         let bounds = vertices.bounds().unwrap();
         let positions = context.download(&world.positions).unwrap();
         let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
-        Self { scene, geometry, positions, bounds, world, bvh }
+        Self { scene, geometry, positions, rest_positions, pose, bounds, world, bvh }
     }
 
     pub fn tracer(&self) -> Tracer<'_> {
@@ -51,7 +58,7 @@ impl Fixture {
     }
 
     pub fn map_input<'a>(&'a self, atlas: &'a Atlas, cache: Option<&'a Path>) -> MapInput<'a> {
-        MapInput { atlas, tracer: self.tracer(), bounds: self.bounds, content: &[], cache }
+        MapInput { atlas, tracer: self.tracer(), apart: None, bounds: self.bounds, content: &[], cache }
     }
 
     pub fn stage<'a>(&'a self, cache: Option<&'a Path>, watch: &'a dyn Watch) -> Stage<'a> {
@@ -59,6 +66,8 @@ impl Fixture {
             scene: &self.scene,
             geometry: &self.geometry,
             positions: &self.positions,
+            rest_positions: &self.rest_positions,
+            pose: &self.pose,
             bounds: self.bounds,
             world: &self.world,
             tracer: self.tracer(),
@@ -75,7 +84,8 @@ impl Fixture {
 
     pub fn solve(&self, context: &Context, method: &SurfaceShadowMaps, bounces: u32) {
         let mut recorder = context.recorder("test").unwrap();
-        method.solve(&mut recorder, &self.world, &self.tracer(), bounces);
+        let lit = Lit { world: &self.world, tracer: self.tracer(), bvh: &self.bvh };
+        method.solve(&mut recorder, lit, bounces);
         recorder.submit().unwrap();
     }
 }

@@ -8,7 +8,7 @@ use linklight::gpu::shaders::atlas::{PartHits, PartHitsParams, PartRays, PartRay
 use linklight::gpu::shaders::types::{Hit, Ray};
 use linklight::scene::environment::Environment;
 use linklight::scene::{Material, Scene};
-use linklight::stages::hidden_parts;
+use linklight::stages::hidden_parts::{self, Seen};
 use linklight::stages::trace::{BACK_FACE, NO_HIT};
 use linklight::stages::work::Unwatched;
 
@@ -31,9 +31,9 @@ fn area_of_floor(fixture: &Fixture, context: &TestContext) -> (f32, f32) {
         floor.map(|texel| texel.area).sum()
     };
     let before = area(&atlas);
-    let tracer = fixture.tracer();
+    let seen = Seen { tracers: &[fixture.tracer()], triangle_objects: &[], ray_offset: 1e-4 };
     let (geometry, positions) = (&fixture.geometry, &fixture.positions);
-    let hidden = hidden_parts::leave_out(context, &tracer, geometry, positions, &mut atlas, 1e-4, &Unwatched).unwrap();
+    let hidden = hidden_parts::leave_out(context, &seen, geometry, positions, &mut atlas, &Unwatched).unwrap();
     println!("{hidden} parts are hidden; the floor has {} m2 of {before}", area(&atlas));
     for (index, texel) in atlas.texels.iter().enumerate() {
         let parts: f32 = atlas.parts_of(index).iter().map(|part| part.area).sum();

@@ -5,4 +5,6 @@ mod common;
 mod fixture;
 mod hidden;
 mod maps;
+mod moving;
+mod outside;
 mod solve;

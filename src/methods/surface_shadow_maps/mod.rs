@@ -14,7 +14,8 @@
 //! | L of a texel | irradiance, `reflected` | W/m2 | `surface_shadow_maps/irradiance` ... |
 //! | threshold | [`Settings::threshold`] | of white | – |
 //!
-//! **Per frame without new maps:** lights, emission, albedo, environment. **With new maps:** surfaces that move.
+//! **Per frame without new maps:** lights, emission, albedo, environment, objects that move rigidly
+//! ([`SurfaceShadowMaps::place`]). **With new maps:** surfaces that bend or scale.
 //!
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
@@ -22,22 +23,29 @@
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
+mod gathering;
+mod moving;
+
 use crate::gpu::shaders::methods::surface_shadow_maps as passes;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
 use crate::scene::atlas::{Atlas, AtlasError};
 use crate::scene::geometry::Geometry;
-use crate::stages::hidden_parts::{self, HiddenPartsError};
+use crate::scene::pose::Pose;
+use crate::stages::bvh::{Bvh, BvhError};
+use crate::stages::hidden_parts::{self, HiddenPartsError, Seen};
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
-    MapFilter, MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
+    self, MapFilter, MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
+    texel_objects,
 };
 use crate::stages::texels::{self, Texels};
 use crate::stages::trace::Tracer;
 use crate::stages::work::Watch;
 use crate::stages::world::World;
 use glam::Vec3;
+use moving::{Apart, Rest};
 use serde::Serialize;
 use std::path::Path;
 
@@ -95,7 +103,16 @@ pub enum SurfaceShadowMapsError {
     #[error(transparent)]
     Maps(#[from] SurfaceMapError),
     #[error(transparent)]
+    Bvh(#[from] BvhError),
+    #[error(transparent)]
     Gpu(#[from] GpuError),
+}
+
+impl Settings {
+    /// How the tree over the texels is built.
+    fn tree_options(&self) -> TreeOptions {
+        TreeOptions { normal_weight: self.tree_normal_weight, layout: self.tree_layout, ..TreeOptions::default() }
+    }
 }
 
 /// What the method reads of the scene.
@@ -103,8 +120,11 @@ pub enum SurfaceShadowMapsError {
 pub struct Stage<'a> {
     pub scene: &'a Scene,
     pub geometry: &'a Geometry,
-    /// World space in the present pose.
+    /// World space, in the present pose.
     pub positions: &'a [Vec3],
+    /// World space, before anything moved.
+    pub rest_positions: &'a [Vec3],
+    pub pose: &'a Pose,
     pub bounds: [Vec3; 2],
     pub world: &'a World,
     pub tracer: Tracer<'a>,
@@ -116,6 +136,15 @@ pub struct Stage<'a> {
     pub watch: &'a dyn Watch,
 }
 
+/// The scene in the pose that is lit.
+#[derive(Clone, Copy)]
+pub struct Lit<'a> {
+    pub world: &'a World,
+    pub tracer: Tracer<'a>,
+    /// What maps do not tell is traced by this.
+    pub bvh: &'a Bvh,
+}
+
 /// The method on one scene.
 pub struct SurfaceShadowMaps {
     settings: Settings,
@@ -123,6 +152,7 @@ pub struct SurfaceShadowMaps {
     pub texels: Texels,
     pub tree: SenderTree,
     pub maps: Option<PlacedMaps>,
+    rest: Option<Rest>,
     tone: ToneSettings,
     seed: u32,
     state: State,
@@ -173,28 +203,32 @@ impl std::fmt::Display for Report {
 impl SurfaceShadowMaps {
     /// Unwraps the scene, builds the tree and makes the maps.
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, SurfaceShadowMapsError> {
-        let mut atlas = make_atlas(stage, settings.atlas_resolution)?;
+        let apart = Apart::of(context, stage, &settings)?;
+        let positions = if apart.is_some() { stage.rest_positions } else { stage.positions };
+        let mut atlas = make_atlas(stage, positions, settings.atlas_resolution)?;
         let ray_offset = map_offset(stage.bounds);
-        let (geometry, positions) = (stage.geometry, stage.positions);
-        hidden_parts::leave_out(context, &stage.tracer, geometry, positions, &mut atlas, ray_offset, stage.watch)?;
+        let tracers = apart.as_ref().map_or(vec![stage.tracer], |apart| apart.tracers(stage));
+        let triangle_objects = apart.as_ref().map_or(&[][..], |apart| &apart.objects.triangle_objects);
+        let seen = Seen { tracers: &tracers, triangle_objects, ray_offset };
+        hidden_parts::leave_out(context, &seen, stage.geometry, positions, &mut atlas, stage.watch)?;
         let texels = Texels::new(context, &atlas, stage.world, ray_offset)?;
-        let options = TreeOptions {
-            normal_weight: settings.tree_normal_weight,
-            layout: settings.tree_layout,
-            ..TreeOptions::default()
-        };
-        let tree = SenderTree::build(context, &texels::leaves(&atlas), options)?;
+        let tree = SenderTree::build(context, &texels::leaves(&atlas), settings.tree_options())?;
         let maps = match settings.visibility {
-            TexelVisibility::Maps => Some(make_maps(context, stage, &atlas, &tree, &settings)?),
+            TexelVisibility::Maps => Some(make_maps(context, stage, &atlas, &tree, &settings, apart.as_ref())?),
             TexelVisibility::Rays => None,
         };
         let state = State::new(context, texels.count as usize)?;
-        Ok(Self { settings, atlas, texels, tree, maps, tone: stage.tone, seed: stage.seed, state })
+        let rest = apart.is_some().then(|| Rest::of(stage, &atlas));
+        let (tone, seed) = (stage.tone, stage.seed);
+        let mut method = Self { settings, atlas, texels, tree, maps, rest, tone, seed, state };
+        method.place(context, stage)?;
+        Ok(method)
     }
 
     /// Direct light of the texels and `bounces` more; leaves the tree filled with all of it, ready to be gathered from.
     ///                                                                                       [Ritschel2008 4.1, Fig. 8]
-    pub fn solve(&self, recorder: &mut Recorder<'_>, world: &World, tracer: &Tracer<'_>, bounces: u32) {
+    pub fn solve(&self, recorder: &mut Recorder<'_>, lit: Lit<'_>, bounces: u32) {
+        let Lit { world, tracer, .. } = lit;
         let (texels, s) = (&self.texels, &self.state);
         for sum in [&s.reflected_sum, &s.indirect, &s.dark] {
             recorder.fill(sum, 0);
@@ -207,16 +241,16 @@ impl SurfaceShadowMaps {
         recorder.dispatch(&pass, texels.count);
         recorder.scope("direct", |recorder| {
             self.tree.pull(recorder, &s.emitted, &s.dark);
-            self.gather(recorder, tracer, 0);
-            texels.add_environment(recorder, tracer, world, self.settings.environment_rays, &s.irradiance);
+            self.gather(recorder, &lit, 0);
+            texels.add_environment(recorder, &tracer, world, self.settings.environment_rays, &s.irradiance);
             recorder.copy(&s.irradiance, &s.direct);
-            texels.add_lights(recorder, tracer, world, self.settings.light_samples, &s.irradiance);
+            texels.add_lights(recorder, &tracer, world, self.settings.light_samples, &s.irradiance);
             self.reflect(recorder, false);
         });
         for bounce in 1..=bounces {
             recorder.scope(format_args!("bounce {bounce}"), |recorder| {
                 self.tree.pull(recorder, &s.dark, &s.reflected);
-                self.gather(recorder, tracer, bounce);
+                self.gather(recorder, &lit, bounce);
                 self.reflect(recorder, true);
             });
         }
@@ -226,77 +260,6 @@ impl SurfaceShadowMaps {
     /// Fills the tree with what emits alone: what is shown without bounces.
     pub fn emit_only(&self, recorder: &mut Recorder<'_>) {
         self.tree.pull(recorder, &self.state.emitted, &self.state.dark);
-    }
-
-    /// Refine and gather for all texels in one walk each.                          [Ritschel2008 4.3, Fig. 10]
-    fn gather(&self, recorder: &mut Recorder<'_>, tracer: &Tracer<'_>, bounce: u32) {
-        use crate::report::tonemap::Operator;
-        let (texels, tree, s) = (&self.texels, &self.tree, &self.state);
-        let (operator, key) = match self.tone.operator {
-            Operator::Reinhard => (0, self.tone.key),
-            Operator::Filmic => (1, self.tone.key),
-            Operator::None => (2, 0.0),
-        };
-        let (nodes, compact) = tree.nodes();
-        macro_rules! gather {
-            ($pass:ident, $params:ident, { $($field:ident: $value:expr),* $(,)? }) => {{
-                let pass = passes::$pass {
-                    $($field: $value,)*
-                    texels: &texels.texels,
-                    albedo: &texels.albedo,
-                    sender_nodes: nodes,
-                    sender_light: &tree.light,
-                    leaves: &tree.leaves,
-                    leaf_light: &tree.leaf_light,
-                    adaptation: &tree.adaptation,
-                    tree_frame: &tree.frame,
-                    irradiance: &s.irradiance,
-                    cut_sizes: &s.cut_sizes,
-                    params: passes::$params {
-                        texel_count: texels.count,
-                        node_count: tree.node_count(),
-                        seed: self.seed.wrapping_add(bounce.wrapping_mul(0x9e37_79b9)),
-                        jitter: u32::from(self.settings.jitter),
-                        ray_offset: texels.ray_offset,
-                        threshold: self.settings.threshold,
-                        exposure: self.tone.exposure.exp2(),
-                        key,
-                        white: self.tone.white,
-                        operator,
-                    },
-                };
-                recorder.dispatch(&pass, texels.count);
-            }};
-        }
-        match (&self.maps, tracer) {
-            (Some(PlacedMaps { maps, leaf_places, frame }), _) => gather!(GatherMaps, GatherMapsParams, {
-                constants: passes::GatherMapsConstants { compact },
-                run_offsets: &maps.run_offsets,
-                runs: &maps.runs,
-                map_origins: &maps.origins,
-                leaf_places: leaf_places,
-                map_frame: frame,
-            }),
-            (None, Tracer::Compute(bvh, surfaces)) => gather!(GatherRays, GatherRaysParams, {
-                constants: passes::GatherRaysConstants { alpha_test: surfaces.has_holes, compact },
-                bvh_nodes: bvh.nodes(),
-                bvh_triangles: bvh.triangles(),
-                triangles: surfaces.triangles,
-                triangle_materials: surfaces.triangle_materials,
-                attributes: surfaces.attributes,
-                materials: surfaces.materials,
-                textures: surfaces.textures,
-            }),
-            (None, Tracer::RayQuery(structure, surfaces)) => gather!(GatherRayQuery, GatherRayQueryParams, {
-                constants: passes::GatherRayQueryConstants { alpha_test: surfaces.has_holes, sees_through: false, compact },
-                acceleration_structure: structure,
-                triangles: surfaces.triangles,
-                triangle_materials: surfaces.triangle_materials,
-                attributes: surfaces.attributes,
-                materials: surfaces.materials,
-                textures: surfaces.textures,
-            }),
-        }
     }
 
     /// What arrived leaves again, and is kept.
@@ -352,10 +315,10 @@ impl SurfaceShadowMaps {
     }
 }
 
-fn make_atlas(stage: &Stage<'_>, resolution: u32) -> Result<Atlas, AtlasError> {
+fn make_atlas(stage: &Stage<'_>, positions: &[Vec3], resolution: u32) -> Result<Atlas, AtlasError> {
     match resolution {
-        0 => Atlas::fitting(stage.scene, stage.geometry, stage.positions, 64, 256),
-        given => Atlas::new(stage.scene, stage.geometry, stage.positions, given),
+        0 => Atlas::fitting(stage.scene, stage.geometry, positions, 64, 256),
+        given => Atlas::new(stage.scene, stage.geometry, positions, given),
     }
 }
 
@@ -365,20 +328,30 @@ fn make_maps(
     atlas: &Atlas,
     tree: &SenderTree,
     settings: &Settings,
+    apart: Option<&Apart>,
 ) -> Result<PlacedMaps, SurfaceShadowMapsError> {
     let options =
         MapOptions { resolution: settings.map_resolution, sequence: settings.sequence, bias: settings.map_bias };
     let holes: Vec<u8> = hole_content(stage.scene);
-    let content = [bytemuck::cast_slice(stage.positions), bytemuck::cast_slice(&stage.geometry.triangles), &holes];
+    let shapes = apart.map_or_else(
+        || bytemuck::cast_slice(stage.positions).to_vec(),
+        |apart| moving::content(apart, stage.rest_positions),
+    );
+    let content = [&shapes[..], bytemuck::cast_slice(&stage.geometry.triangles), &holes];
+    let tracers = apart.map(|apart| apart.tracers(stage)).unwrap_or_default();
+    let texel_objects = apart.map(|apart| texel_objects(atlas, &apart.objects)).unwrap_or_default();
     let input = MapInput {
         atlas,
         tracer: stage.tracer,
+        apart: apart.map(|_| surface_maps::Apart { tracers: &tracers, texel_objects: &texel_objects }),
         bounds: stage.bounds,
         content: &content,
         cache: stage.cache.filter(|_| settings.keep_maps),
     };
     let maps = SurfaceMaps::new(context, input, options, stage.watch)?;
-    Ok(PlacedMaps::new(context, maps, &tree.topology.leaf_order, settings.map_filter)?)
+    let moving = apart.map(|apart| apart.maps(context, stage, atlas, &maps)).transpose()?;
+    let placed = PlacedMaps::new(context, maps, &tree.topology.leaf_order, settings.map_filter)?;
+    Ok(PlacedMaps { moving, ..placed })
 }
 
 /// What decides which rays pass through holes: cutoffs and textures of masked materials.

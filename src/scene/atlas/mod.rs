@@ -11,7 +11,7 @@ mod raster;
 use super::Scene;
 use super::charts::{Charts, Options, Surface, unwrap};
 use super::geometry::Geometry;
-use glam::{UVec2, Vec2, Vec3};
+use glam::{Mat4, UVec2, Vec2, Vec3};
 use pack::Packing;
 
 /// "No texel" of an entry of [`Atlas::texel_at`].
@@ -211,6 +211,19 @@ impl Atlas {
             self.texels.push(Texel { chart, first_part: self.parts.len() as u32, ..texel });
             self.parts.extend(parts);
         }
+    }
+
+    /// The same texels where `moved` (of each) took them.
+    pub fn moved(&self, moved: impl Fn(usize) -> Mat4) -> Self {
+        let mut atlas = self.clone();
+        for (index, texel) in atlas.texels.iter_mut().enumerate() {
+            let transform = moved(index);
+            texel.position = transform.transform_point3(texel.position);
+            texel.normal = transform.transform_vector3(texel.normal).normalize_or_zero();
+            texel.side_u = transform.transform_vector3(texel.side_u);
+            texel.side_v = transform.transform_vector3(texel.side_v);
+        }
+        atlas
     }
 
     /// Where each part stands in space (metres), and the unit normal of its side: what a test of each starts from.

@@ -11,25 +11,30 @@
 //! | q | pixel of a cube map | – |
 //! | z | depth code: distance times `codes_per_metre` | 1 / 65534 of the scene's extent |
 //!
-//! What it does not do: it knows the pose it was made in, and nothing that moves against it.
+//! Objects that move rigidly keep their maps: [`MovingMaps`] tells what is between points of different ones.
+//!
+//! What it does not do: it knows the shapes it was made of, and nothing that bends.
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
 mod cache;
 mod compress;
+mod outside;
 pub mod sequence;
 
 pub use cache::{Found, Key};
 pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, Run};
+pub use outside::{Ball, MovingMaps, MovingTables, texel_objects};
 pub use sequence::Sequence;
 
 use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
 use crate::gpu::shaders::surface_maps as passes;
-use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
+use crate::gpu::shaders::types::{AtlasTexel, Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::atlas::Atlas;
-use glam::Vec3;
+use glam::{UVec2, Vec3};
+use std::ops::Range;
 use std::path::Path;
 
 /// Rays that are cast together.
@@ -94,12 +99,23 @@ pub struct SurfaceMaps {
 pub struct MapInput<'a> {
     pub atlas: &'a Atlas,
     pub tracer: Tracer<'a>,
+    /// Objects that move against each other see themselves alone; `None`: all see all, by `tracer`.
+    pub apart: Option<Apart<'a>>,
     /// World-space corners of the scene.
     pub bounds: [Vec3; 2],
     /// What the rays may hit, as plain data: goes into the key on disk.
     pub content: &'a [&'a [u8]],
     /// Where maps are kept; `None` keeps none.
     pub cache: Option<&'a Path>,
+}
+
+/// Objects that move against each other.
+#[derive(Clone, Copy)]
+pub struct Apart<'a> {
+    /// How rays are cast at each object alone.
+    pub tracers: &'a [Tracer<'a>],
+    /// Of each texel.
+    pub texel_objects: &'a [u32],
 }
 
 impl SurfaceMaps {
@@ -114,7 +130,11 @@ impl SurfaceMaps {
         if atlas.texels.len() > MAX_PLACES {
             return Err(SurfaceMapError::TooManyTexels { texels: atlas.texels.len() });
         }
-        let order = sequence::walk(atlas, options.sequence);
+        let mut order = sequence::walk(atlas, options.sequence);
+        if let Some(apart) = input.apart {
+            // One object after the other.
+            order.sort_by_key(|&texel| apart.texel_objects[texel as usize]);
+        }
         let mut places = vec![0; order.len()];
         order.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
         let Placement { origins, normals, offset, codes_per_metre } = Placement::new(&input, &order);
@@ -131,7 +151,7 @@ impl SurfaceMaps {
                 if let (Some(Found::Damaged(reason)), Some(folder)) = (&found, input.cache) {
                     tracing::warn!("{} is damaged ({reason}); made anew", key.file_in(folder).display());
                 }
-                let maker = Maker { context, tracer: input.tracer, options, codes_per_metre, gap: offset };
+                let maker = Maker { context, legs: legs(&input, &order), options, codes_per_metre, gap: offset };
                 let maps = maker.make(&origins, &normals, watch)?;
                 ray_count = 2 * maps.pixel_count() as u64 * u64::from(maps.place_count);
                 if let Some(folder) = input.cache
@@ -196,6 +216,9 @@ pub struct PlacedMaps {
     pub leaf_places: Buffer<u32>,
     /// One: how the maps are read.
     pub frame: Buffer<SurfaceMapFrame>,
+    pub filter: MapFilter,
+    /// What moves against each other.
+    pub moving: Option<MovingMaps>,
 }
 
 impl PlacedMaps {
@@ -206,7 +229,40 @@ impl PlacedMaps {
             leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
             frame: context.upload("surface_maps/frame", &[maps.frame(filter)])?,
             maps,
+            filter,
+            moving: None,
         })
+    }
+
+    /// Of pairs of texels (sender, receiver) that may belong to objects that move: what share of the way is free, or -1
+    /// where rays must be asked; the first `count` pairs. Does nothing where nothing moves.
+    pub fn query_pairs(
+        &self,
+        recorder: &mut Recorder<'_>,
+        texels: &Buffer<AtlasTexel>,
+        pairs: &Buffer<UVec2>,
+        visibility: &Buffer<f32>,
+        count: usize,
+    ) {
+        let Some(moving) = &self.moving else { return };
+        let pass = passes::MovingQuery {
+            pairs,
+            texels,
+            map_origins: &self.maps.origins,
+            run_offsets: &self.maps.run_offsets,
+            runs: &self.maps.runs,
+            rigid_words: &moving.words,
+            rigid_objects: &moving.present,
+            visibility,
+            params: passes::MovingQueryParams { pair_count: count as u32, frame: self.maps.frame(self.filter) },
+        };
+        recorder.dispatch(&pass, count);
+    }
+
+    /// Takes over a tree that was built anew over the same leaves.
+    pub fn reorder(&self, context: &Context, leaf_order: &[u32]) -> Result<(), GpuError> {
+        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| self.maps.places[texel as usize]).collect();
+        context.write(&self.leaf_places, &leaf_places)
     }
 }
 
@@ -220,8 +276,8 @@ pub fn uncompressed(
 ) -> Result<Vec<Interval>, SurfaceMapError> {
     let frame = Placement::new(&input, order);
     let mut all = Vec::new();
-    let maker =
-        Maker { context, tracer: input.tracer, options, codes_per_metre: frame.codes_per_metre, gap: frame.offset };
+    let (legs, codes_per_metre) = (legs(&input, order), frame.codes_per_metre);
+    let maker = Maker { context, legs, options, codes_per_metre, gap: frame.offset };
     maker.intervals(&frame.origins, &frame.normals, watch, |maps, _| {
         all.extend_from_slice(maps);
         Ok(())
@@ -257,10 +313,24 @@ pub fn map_offset([low, high]: [Vec3; 2]) -> f32 {
     1e-5 * reach
 }
 
+/// Places of the sequence, one part after the other, with what each is seen by.
+fn legs<'a>(input: &MapInput<'a>, order: &[u32]) -> Vec<(Range<usize>, Tracer<'a>)> {
+    let Some(Apart { tracers, texel_objects }) = input.apart else { return vec![(0..order.len(), input.tracer)] };
+    let object = |place: usize| texel_objects[order[place] as usize] as usize;
+    let mut first = 0;
+    let legs = order.chunk_by(|&a, &b| texel_objects[a as usize] == texel_objects[b as usize]);
+    legs.map(|leg| {
+        let places = first..first + leg.len();
+        first = places.end;
+        (places.clone(), tracers[object(places.start)])
+    })
+    .collect()
+}
+
 /// Casts and compresses.
 struct Maker<'a> {
     context: &'a Context,
-    tracer: Tracer<'a>,
+    legs: Vec<(Range<usize>, Tracer<'a>)>,
     options: MapOptions,
     codes_per_metre: f32,
     /// How far behind a surface the next is sought, metres.
@@ -312,11 +382,14 @@ impl Maker<'_> {
             second_hits: context.buffer("surface_maps/second hits", ray_count)?,
             intervals: context.buffer("surface_maps/intervals", ray_count)?,
         };
-        for first in (0..origins.len()).step_by(chunk_places) {
+        let chunks = self.legs.iter().flat_map(|(places, tracer)| {
+            let end = places.end;
+            places.clone().step_by(chunk_places).map(move |first| (first, chunk_places.min(end - first), tracer))
+        });
+        for (first, count, tracer) in chunks {
             watch.step("surface shadow maps", first as u64, origins.len() as u64)?;
-            let count = chunk_places.min(origins.len() - first);
             let mut recorder = context.recorder("surface maps")?;
-            self.cast(&mut recorder, &chunk, &map_origins, &map_normals, first as u32, count as u32);
+            self.cast(&mut recorder, tracer, &chunk, (&map_origins, &map_normals), first as u32, count as u32);
             recorder.submit()?;
             let words = context.download_range(&chunk.intervals, 0..count * pixel_count)?;
             hand_on(bytemuck::cast_slice(&words), count)?;
@@ -329,9 +402,9 @@ impl Maker<'_> {
     fn cast(
         &self,
         recorder: &mut Recorder<'_>,
+        tracer: &Tracer<'_>,
         chunk: &Chunk,
-        map_origins: &Buffer<Vec3>,
-        map_normals: &Buffer<Vec3>,
+        (map_origins, map_normals): (&Buffer<Vec3>, &Buffer<Vec3>),
         first_place: u32,
         chunk_count: u32,
     ) {
@@ -340,10 +413,10 @@ impl Maker<'_> {
         let rays = &chunk.rays;
         let params = passes::CubeRaysParams { first_place, chunk_count, resolution };
         recorder.dispatch(&passes::CubeRays { map_origins, map_normals, rays, params }, ray_count);
-        trace::closest_hit(recorder, &self.tracer, rays, &chunk.hits, ray_count as usize);
+        trace::closest_hit(recorder, tracer, rays, &chunk.hits, ray_count as usize);
         let params = passes::SecondRaysParams { ray_count, gap: self.gap };
         recorder.dispatch(&passes::SecondRays { hits: &chunk.hits, rays, params }, ray_count);
-        trace::closest_hit(recorder, &self.tracer, rays, &chunk.second_hits, ray_count as usize);
+        trace::closest_hit(recorder, tracer, rays, &chunk.second_hits, ray_count as usize);
         let pass = passes::Intervals {
             map_normals,
             hits: &chunk.hits,
