@@ -33,10 +33,19 @@ float slack;            // how far rounding may have moved the receiver, metres
 float shown;            // what the pixel shows so far, as the display encodes it
 float shown_luminance;
 
+// What the display shows of a luminance. Beyond its white, where it shows nothing more, shares count as they do below: the
+// picture may be shown darker later.
+float shown_value(float luminance)
+{
+    float x = options.scale * luminance;
+    float white = options.operator == TONE_REINHARD ? options.white : options.operator == TONE_FILMIC ? 5.6 : 1.0;
+    return display_value(x, options.operator, options.white) + (x > white ? log(x / white) / 2.4 : 0.0);
+}
+
 void start_showing(float luminance_so_far)
 {
     shown_luminance = luminance_so_far;
-    shown = display_value(options.scale * luminance_so_far, options.operator, options.white);
+    shown = shown_value(luminance_so_far);
 }
 
 float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }
@@ -48,7 +57,7 @@ uint sender_decision(SenderNode node, bool is_leaf)
     float bound = largest_radiance(node, receiver);
     if (bound <= 0.0) return SENDER_IGNORE;
     if (is_leaf) return SENDER_TAKE;
-    float change = display_value(options.scale * (shown_luminance + bound), options.operator, options.white) - shown;
+    float change = shown_value(shown_luminance + bound) - shown;
     return change > options.threshold ? SENDER_REFINE : SENDER_TAKE;
 }
 

@@ -15,6 +15,7 @@ struct SurfaceMapFrame {
     uint resolution;        // pixels a side of a face
     float codes_per_metre;
     uint filter_mode;       // 0: the pixel itself, 1: one of four around, drawn by its share, 2: all four
+    uint sender_filter;     // of the sender's texel and those beside it: 0, 1, 2 likewise
 };
 
 // The depth at a place of the sequence: of the last run that starts at it or before.

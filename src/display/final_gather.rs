@@ -252,7 +252,8 @@ impl FinalGather {
                 run_offsets: &placed.maps.run_offsets,
                 runs: &placed.maps.runs,
                 map_origins: &placed.maps.origins,
-                leaf_places: &placed.leaf_places
+                leaf_places: &placed.leaf_places,
+                leaf_neighbours: &placed.leaf_neighbours
             ),
             (Tracer::Compute(bvh, surfaces), None) => gather!(
                 FinalGather,

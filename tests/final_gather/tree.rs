@@ -71,3 +71,40 @@ fn powers_add_up_and_representatives_are_the_heaviest() {
         }
     }
 }
+
+/// Luminance that the leaves are adapted to: log-average by area, without what is dark beside the rest.
+fn adaptation(areas: &[f32], reflected: &[Vec3]) -> f64 {
+    let luminance = |v: Vec3| f64::from(v.dot(Vec3::new(0.2126, 0.7152, 0.0722))) / std::f64::consts::PI;
+    let weighted = || areas.iter().zip(reflected).map(|(&area, &v)| (f64::from(area), luminance(v)));
+    let (light, area) = weighted().fold((0.0, 0.0), |(light, sum), (area, l)| (light + area * l, sum + area));
+    let lit = weighted().filter(|(_, l)| *l > 1e-3 * light / area);
+    let (log, area) = lit.fold((0.0, 0.0), |(log, sum), (area, l)| (log + area * l.ln(), sum + area));
+    if area > 0.0 { (log / area).exp() } else { 0.0 }
+}
+
+/// Leaves inside of things are nearly dark; half of all being so must not make the rest look white.
+#[test]
+fn what_nobody_sees_does_not_adapt_the_eye() {
+    let context = TestContext::new();
+    let random = &mut Random(4);
+    let mut vector = |scale: f32| scale * Vec3::new(random.unit(), random.unit(), random.unit());
+    let leaves: Vec<_> = (0..777).map(|_| parallelogram(vector(5.0), vector(0.2), vector(0.2))).collect();
+    let mut reflected: Vec<Vec3> = leaves.iter().map(|_| vector(2.0)).collect();
+    let areas: Vec<f32> = leaves.iter().map(sender_tree::area).collect();
+    let adapted = |reflected: &[Vec3]| {
+        let tree = SenderTree::build(&context, &leaves, TreeOptions::default()).unwrap();
+        let [dark, sent] =
+            [&vec![Vec3::ZERO; leaves.len()][..], reflected].map(|v| context.upload("test/sent", v).unwrap());
+        let mut recorder = context.recorder("test").unwrap();
+        tree.pull(&mut recorder, &dark, &sent);
+        recorder.submit().unwrap();
+        f64::from(context.download(&tree.adaptation).unwrap()[0])
+    };
+    let all_lit = adapted(&reflected);
+    assert!((all_lit / adaptation(&areas, &reflected) - 1.0).abs() < 1e-3);
+    reflected.iter_mut().step_by(2).for_each(|v| *v *= 1e-7);
+    let half_dark = adapted(&reflected);
+    assert!((half_dark / adaptation(&areas, &reflected) - 1.0).abs() < 1e-3);
+    assert!((half_dark / all_lit - 1.0).abs() < 0.2, "{half_dark} for {all_lit}: the dark half counts");
+    assert_eq!(adapted(&vec![Vec3::ZERO; leaves.len()]), 0.0);
+}

@@ -4,6 +4,7 @@
 mod common;
 mod fixture;
 mod hidden;
+mod kernels;
 mod maps;
 mod moving;
 mod outside;

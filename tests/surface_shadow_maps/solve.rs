@@ -15,6 +15,7 @@ const SMALL: Settings = Settings {
     sequence: linklight::stages::surface_maps::Sequence::Spiral,
     map_bias: 1.0,
     map_filter: linklight::stages::surface_maps::MapFilter::Drawn,
+    sender_filter: linklight::stages::surface_maps::MapFilter::Drawn,
     visibility: TexelVisibility::Rays,
     threshold: 0.02,
     jitter: true,

@@ -1,7 +1,7 @@
 #version 460
 #include "lib/prelude.glsl"
 #include "lib/sender_gather.glsl"
-#include "lib/surface_map.glsl"
+#include "lib/sender_maps.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
 // reads texels, albedo, the sender tree, the maps   writes irradiance (W/m2), cut_sizes [texel_count]   shared none
@@ -9,15 +9,17 @@ layout(set = 0, binding = 0, scalar) readonly buffer RunOffsets { uint run_offse
 layout(set = 0, binding = 1, scalar) readonly buffer Runs { uint runs[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };       // by place
 layout(set = 0, binding = 3, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 layout(set = 0, binding = 4, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
 
 uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
 uint surface_run(uint index) { return runs[index]; }
+vec3 surface_map_origin(uint place) { return map_origins[place]; }
 
 float visibility(vec3 origin, vec3 target, uint leaf)
 {
-    uint place = leaf_places[leaf];
-    return surface_map_visibility(map_frame[0], place, map_origins[place], origin, receiver.geometric);
+    vec2 at = place_on_leaf(sender_shape(leaf), target);
+    return sender_maps_visibility(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], at, origin, receiver.geometric);
 }
 
 #include "methods/surface_shadow_maps/gather.glsl"

@@ -67,13 +67,14 @@ impl SurfaceShadowMaps {
                     rigid_objects: &moving.present,
                 });
             }
-            (Some(PlacedMaps { maps, leaf_places, frame, moving: None, .. }), _) => {
+            (Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: None, .. }), _) => {
                 gather!(GatherMaps, GatherMapsParams, {
                     constants: passes::GatherMapsConstants { compact },
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
                     map_origins: &maps.origins,
                     leaf_places: leaf_places,
+                    leaf_neighbours: leaf_neighbours,
                     map_frame: frame,
                 })
             }

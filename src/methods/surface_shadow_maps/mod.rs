@@ -72,6 +72,8 @@ crate::settings! {
         map_bias: f32 = 0.05, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
         /// How look-ups are filtered between pixels of a map.
         map_filter: MapFilter = MapFilter::Drawn, paper "not given";
+        /// How look-ups are filtered between a sender's texel and those beside it, where points on senders are drawn.
+        sender_filter: MapFilter = MapFilter::Drawn, paper "not given";
         /// What decides whether texels see each other.
         visibility: TexelVisibility = TexelVisibility::Maps, paper "maps";
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.
@@ -350,7 +352,13 @@ fn make_maps(
     };
     let maps = SurfaceMaps::new(context, input, options, stage.watch)?;
     let moving = apart.map(|apart| apart.maps(context, stage, atlas, &maps)).transpose()?;
-    let placed = PlacedMaps::new(context, maps, &tree.topology.leaf_order, settings.map_filter)?;
+    let placed = PlacedMaps::new(
+        context,
+        maps,
+        atlas,
+        &tree.topology.leaf_order,
+        [settings.map_filter, settings.sender_filter],
+    )?;
     Ok(PlacedMaps { moving, ..placed })
 }
 

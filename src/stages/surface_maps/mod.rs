@@ -176,15 +176,17 @@ impl SurfaceMaps {
     }
 
     /// How shaders read the maps.
-    pub fn frame(&self, filter: MapFilter) -> SurfaceMapFrame {
+    pub fn frame(&self, filter: MapFilter, sender_filter: MapFilter) -> SurfaceMapFrame {
+        let code = |filter| match filter {
+            MapFilter::None => 0,
+            MapFilter::Drawn => 1,
+            MapFilter::Four => 2,
+        };
         SurfaceMapFrame {
             resolution: self.options.resolution,
             codes_per_metre: self.codes_per_metre,
-            filter_mode: match filter {
-                MapFilter::None => 0,
-                MapFilter::Drawn => 1,
-                MapFilter::Four => 2,
-            },
+            filter_mode: code(filter),
+            sender_filter: code(sender_filter),
         }
     }
 
@@ -203,7 +205,7 @@ impl SurfaceMaps {
             run_offsets: &self.run_offsets,
             runs: &self.runs,
             visibility,
-            params: passes::QueryParams { query_count: count as u32, frame: self.frame(filter) },
+            params: passes::QueryParams { query_count: count as u32, frame: self.frame(filter, MapFilter::None) },
         };
         recorder.dispatch(&pass, count);
     }
@@ -214,6 +216,8 @@ pub struct PlacedMaps {
     pub maps: SurfaceMaps,
     /// Place in the sequence of each leaf, in tree order.
     pub leaf_places: Buffer<u32>,
+    /// Of the same leaves: places of the texels beside them along their sides, u first, then v; back and forth.
+    pub leaf_neighbours: Buffer<[u32; 4]>,
     /// One: how the maps are read.
     pub frame: Buffer<SurfaceMapFrame>,
     pub filter: MapFilter,
@@ -222,14 +226,23 @@ pub struct PlacedMaps {
 }
 
 impl PlacedMaps {
-    /// `leaf_order` gives the texel of each leaf of the tree.
-    pub fn new(context: &Context, maps: SurfaceMaps, leaf_order: &[u32], filter: MapFilter) -> Result<Self, GpuError> {
+    /// `leaf_order` gives the texel of each leaf of the tree; `filters` are between pixels and between senders.
+    pub fn new(
+        context: &Context,
+        maps: SurfaceMaps,
+        atlas: &Atlas,
+        leaf_order: &[u32],
+        filters: [MapFilter; 2],
+    ) -> Result<Self, GpuError> {
         let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect();
+        let beside = |&texel: &u32| neighbours(atlas, texel as usize).map(|other| maps.places[other]);
+        let leaf_neighbours: Vec<[u32; 4]> = leaf_order.iter().map(beside).collect();
         Ok(Self {
             leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
-            frame: context.upload("surface_maps/frame", &[maps.frame(filter)])?,
+            leaf_neighbours: context.upload("surface_maps/leaf neighbours", &leaf_neighbours)?,
+            frame: context.upload("surface_maps/frame", &[maps.frame(filters[0], filters[1])])?,
             maps,
-            filter,
+            filter: filters[0],
             moving: None,
         })
     }
@@ -254,7 +267,10 @@ impl PlacedMaps {
             rigid_words: &moving.words,
             rigid_objects: &moving.present,
             visibility,
-            params: passes::MovingQueryParams { pair_count: count as u32, frame: self.maps.frame(self.filter) },
+            params: passes::MovingQueryParams {
+                pair_count: count as u32,
+                frame: self.maps.frame(self.filter, MapFilter::None),
+            },
         };
         recorder.dispatch(&pass, count);
     }
@@ -264,6 +280,27 @@ impl PlacedMaps {
         let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| self.maps.places[texel as usize]).collect();
         context.write(&self.leaf_places, &leaf_places)
     }
+}
+
+/// The texels of its chart that lie beside a texel towards +u, -u, +v and -v of its sides; itself where there is none.
+fn neighbours(atlas: &Atlas, texel: usize) -> [usize; 4] {
+    let own = &atlas.texels[texel];
+    let mut found = [texel; 4];
+    for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+        let Some(at) = own.at.checked_add_signed(glam::IVec2::new(dx, dy)) else { continue };
+        if at.max_element() >= atlas.resolution {
+            continue;
+        }
+        let index = atlas.texel_at[(at.y * atlas.resolution + at.x) as usize];
+        let Some(other) = atlas.texels.get(index as usize).filter(|other| other.chart == own.chart) else { continue };
+        // Along which side it lies, in widths of the texel.
+        let offset = other.position - own.position;
+        let along =
+            [own.side_u, own.side_v].map(|side| offset.dot(side) / side.length_squared().max(f32::MIN_POSITIVE));
+        let axis = usize::from(along[1].abs() > along[0].abs());
+        found[2 * axis + usize::from(along[axis] < 0.0)] = index as usize;
+    }
+    found
 }
 
 /// The maps of all places before compression, one after the other: what tests hold the compressed ones against.
