@@ -73,7 +73,7 @@ fn surface_maps(criterion: &mut Criterion) {
     let method = SurfaceShadowMaps::prepare(&context, &stage, Settings::default()).unwrap();
     println!("{name}: {}; made in {:.1} s", method.report(), start.elapsed().as_secs_f64());
     let maps = &method.maps.as_ref().expect("maps by default").maps;
-    let bytes = maps.maps.size_bytes() as f64 / f64::from(method.texels.count.max(1));
+    let bytes = maps.size_bytes() as f64 / f64::from(method.texels.count.max(1));
     println!("  {bytes:.0} bytes a texel at 6 x {0} x {0}", maps.options.resolution);
 
     making(&context, &method, maps, &tracer, bounds);

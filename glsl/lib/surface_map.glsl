@@ -3,12 +3,12 @@
 // Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
 //
 // Bridges: the kernel binds the runs of all pixels.
-//     uint surface_run_offset(uint pixel)        where the pixel's runs start; its successor's ends them
-//     uint surface_run(uint index)               depth | first place << 16
+//     uint surface_run_offset(uint index)        where the runs of a pixel's block start; the next one's ends them
+//     uint surface_run(uint index)               words: depths, two each, then where runs start in their blocks
 #include "lib/cube_map.glsl"
 #include "lib/random.glsl"
 
-uint surface_run_offset(uint pixel);
+uint surface_run_offset(uint index);
 uint surface_run(uint index);
 
 struct SurfaceMapFrame {
@@ -16,19 +16,26 @@ struct SurfaceMapFrame {
     float codes_per_metre;
     uint filter_mode;       // 0: the pixel itself, 1: one of four around, drawn by its share, 2: all four
     uint sender_filter;     // of the sender's texel and those beside it: 0, 1, 2 likewise
+    uint block_bits;        // places of a block are 2 to this, 8 or 16
+    uint block_count;
+    uint firsts_at;         // words before those that tell where runs start
 };
 
-// The depth at a place of the sequence: of the last run that starts at it or before.
-uint surface_map_depth(uint place, uint pixel)
+// The depth at a place of the sequence: of the last run of its block that starts at it or before.
+uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
 {
-    uint low = surface_run_offset(pixel), high = surface_run_offset(pixel + 1);
+    uint bits = frame.block_bits, mask = (1u << bits) - 1, shift = bits == 8 ? 2 : 1;
+    uint block = pixel * frame.block_count + (place >> bits), within = place & mask;
+    uint low = surface_run_offset(block), high = surface_run_offset(block + 1);
     // low's run starts at or before the place, high's after it.
     while (high - low > 1) {
         uint middle = low + high >> 1;
-        if (surface_run(middle) >> 16 <= place) low = middle;
+        uint word = surface_run(frame.firsts_at + (middle >> shift));
+        uint first = word >> bits * (middle & (1u << shift) - 1) & mask;
+        if (first <= within) low = middle;
         else high = middle;
     }
-    return surface_run(low) & 0xffffu;
+    return surface_run(low >> 1) >> 16 * (low & 1) & 0xffffu;
 }
 
 // Widths of a pixel by which the point's plane may lie off the point's own distance.
@@ -52,7 +59,7 @@ float surface_pixel_seen(SurfaceMapFrame frame, SurfaceMapSight sight, uint plac
     float width = FARTHEST_PLANE / float(frame.resolution) * sight.distance_to;
     if (!(abs(along - sight.distance_to) <= width)) along = sight.distance_to;
     float code = min(along * frame.codes_per_metre, 65533.0);
-    return code <= float(surface_map_depth(place, pixel)) ? 1.0 : 0.0;
+    return code <= float(surface_map_depth(frame, place, pixel)) ? 1.0 : 0.0;
 }
 
 // Share of the point that is seen from the texel at `place`, whose map stands at `from`; 0 or 1 unfiltered.

@@ -9,7 +9,8 @@ use crate::app::AppError;
 use crate::app::cli::{Cli, Command, Global};
 use crate::app::render::RenderRequest;
 use crate::app::values::SceneSource;
-use crate::methods::settings::Assignment;
+use crate::display::final_gather;
+use crate::methods::settings::{Assignment, SettingGroup as _};
 use crate::methods::{METHODS, Method, find};
 
 /// The method that the others are held to.
@@ -157,8 +158,10 @@ impl Plan<'_> {
     }
 }
 
+/// Of its own, or of the final gather that shows it.
 fn has_setting(method: &Method, name: &str) -> bool {
-    method.specs().iter().any(|spec| spec.name == name)
+    let of_display = || final_gather::Settings::specs().iter().any(|spec| spec.name == name);
+    method.specs().iter().any(|spec| spec.name == name) || method.key != REFERENCE && of_display()
 }
 
 /// A setting applies to the methods that have it; any other name is an option of `render`, for all of them.

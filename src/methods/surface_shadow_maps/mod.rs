@@ -310,8 +310,8 @@ impl SurfaceShadowMaps {
             atlas_resolution: self.atlas.resolution,
             nodes: self.tree.node_count(),
             tree_bytes: self.tree.size_bytes(),
-            map_bytes: maps.map_or(0, |maps| maps.maps.size_bytes()),
-            ratio: maps.map_or(0.0, |maps| maps.maps.ratio()),
+            map_bytes: maps.map_or(0, SurfaceMaps::size_bytes),
+            ratio: maps.map_or(0.0, SurfaceMaps::ratio),
             map_rays: maps.map_or(0, |maps| maps.ray_count),
         }
     }

@@ -20,20 +20,22 @@
 mod cache;
 mod compress;
 mod outside;
+mod placed;
 pub mod sequence;
 
 pub use cache::{Found, Key};
-pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, Run};
+pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, PackedRuns, Run};
 pub use outside::{Ball, MovingMaps, MovingTables, texel_objects};
+pub use placed::PlacedMaps;
 pub use sequence::Sequence;
 
 use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
 use crate::gpu::shaders::surface_maps as passes;
-use crate::gpu::shaders::types::{AtlasTexel, Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
+use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::atlas::Atlas;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 use std::ops::Range;
 use std::path::Path;
 
@@ -87,11 +89,25 @@ pub struct SurfaceMaps {
     /// Where the maps stand, by place, metres.
     pub origins: Buffer<Vec3>,
     pub run_offsets: Buffer<u32>,
-    /// depth | first place << 16.
     pub runs: Buffer<u32>,
+    /// How the runs lie in both.
+    packing: Packing,
     pub codes_per_metre: f32,
     /// Rays that were cast; 0 when read from disk.
     pub ray_count: u64,
+}
+
+/// Of [`PackedRuns`], what is not in their tables.
+struct Packing {
+    block_bits: u32,
+    block_count: u32,
+    firsts_at: u32,
+}
+
+impl Packing {
+    fn of(packed: &PackedRuns) -> Self {
+        Self { block_bits: packed.block_bits, block_count: packed.block_count, firsts_at: packed.firsts_at }
+    }
 }
 
 /// What maps are made of.
@@ -162,17 +178,38 @@ impl SurfaceMaps {
                 maps
             }
         };
-        let words: Vec<u32> = maps.runs.iter().map(|run| u32::from(run.depth) | u32::from(run.first) << 16).collect();
+        let packed = PackedRuns::smallest(&maps);
         Ok(Self {
             options,
             places,
             origins: context.upload("surface_maps/origins", &origins)?,
-            run_offsets: context.upload("surface_maps/run offsets", &maps.offsets)?,
-            runs: context.upload("surface_maps/runs", &words)?,
+            run_offsets: context.upload("surface_maps/run offsets", &packed.offsets)?,
+            runs: context.upload("surface_maps/runs", &packed.words)?,
+            packing: Packing::of(&packed),
             maps,
             codes_per_metre,
             ray_count,
         })
+    }
+
+    /// Bytes on the device.
+    pub fn size_bytes(&self) -> u64 {
+        self.run_offsets.size_bytes() + self.runs.size_bytes()
+    }
+
+    /// Bytes of the maps in 16 bits a pixel, for each byte on the device.
+    pub fn ratio(&self) -> f64 {
+        let plain = self.maps.pixel_count() as u64 * u64::from(self.maps.place_count) * size_of::<u16>() as u64;
+        plain as f64 / self.size_bytes() as f64
+    }
+
+    /// The same maps in blocks of 256 places (8) or of 65536 (16).
+    pub fn repack(&mut self, context: &Context, block_bits: u32) -> Result<(), GpuError> {
+        let packed = PackedRuns::of(&self.maps, block_bits);
+        self.run_offsets = context.upload("surface_maps/run offsets", &packed.offsets)?;
+        self.runs = context.upload("surface_maps/runs", &packed.words)?;
+        self.packing = Packing::of(&packed);
+        Ok(())
     }
 
     /// How shaders read the maps.
@@ -187,6 +224,9 @@ impl SurfaceMaps {
             codes_per_metre: self.codes_per_metre,
             filter_mode: code(filter),
             sender_filter: code(sender_filter),
+            block_bits: self.packing.block_bits,
+            block_count: self.packing.block_count,
+            firsts_at: self.packing.firsts_at,
         }
     }
 
@@ -209,98 +249,6 @@ impl SurfaceMaps {
         };
         recorder.dispatch(&pass, count);
     }
-}
-
-/// The maps as the leaves of a sender tree ask them.
-pub struct PlacedMaps {
-    pub maps: SurfaceMaps,
-    /// Place in the sequence of each leaf, in tree order.
-    pub leaf_places: Buffer<u32>,
-    /// Of the same leaves: places of the texels beside them along their sides, u first, then v; back and forth.
-    pub leaf_neighbours: Buffer<[u32; 4]>,
-    /// One: how the maps are read.
-    pub frame: Buffer<SurfaceMapFrame>,
-    pub filter: MapFilter,
-    /// What moves against each other.
-    pub moving: Option<MovingMaps>,
-}
-
-impl PlacedMaps {
-    /// `leaf_order` gives the texel of each leaf of the tree; `filters` are between pixels and between senders.
-    pub fn new(
-        context: &Context,
-        maps: SurfaceMaps,
-        atlas: &Atlas,
-        leaf_order: &[u32],
-        filters: [MapFilter; 2],
-    ) -> Result<Self, GpuError> {
-        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect();
-        let beside = |&texel: &u32| neighbours(atlas, texel as usize).map(|other| maps.places[other]);
-        let leaf_neighbours: Vec<[u32; 4]> = leaf_order.iter().map(beside).collect();
-        Ok(Self {
-            leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
-            leaf_neighbours: context.upload("surface_maps/leaf neighbours", &leaf_neighbours)?,
-            frame: context.upload("surface_maps/frame", &[maps.frame(filters[0], filters[1])])?,
-            maps,
-            filter: filters[0],
-            moving: None,
-        })
-    }
-
-    /// Of pairs of texels (sender, receiver) that may belong to objects that move: what share of the way is free, or -1
-    /// where rays must be asked; the first `count` pairs. Does nothing where nothing moves.
-    pub fn query_pairs(
-        &self,
-        recorder: &mut Recorder<'_>,
-        texels: &Buffer<AtlasTexel>,
-        pairs: &Buffer<UVec2>,
-        visibility: &Buffer<f32>,
-        count: usize,
-    ) {
-        let Some(moving) = &self.moving else { return };
-        let pass = passes::MovingQuery {
-            pairs,
-            texels,
-            map_origins: &self.maps.origins,
-            run_offsets: &self.maps.run_offsets,
-            runs: &self.maps.runs,
-            rigid_words: &moving.words,
-            rigid_objects: &moving.present,
-            visibility,
-            params: passes::MovingQueryParams {
-                pair_count: count as u32,
-                frame: self.maps.frame(self.filter, MapFilter::None),
-            },
-        };
-        recorder.dispatch(&pass, count);
-    }
-
-    /// Takes over a tree that was built anew over the same leaves.
-    pub fn reorder(&self, context: &Context, leaf_order: &[u32]) -> Result<(), GpuError> {
-        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| self.maps.places[texel as usize]).collect();
-        context.write(&self.leaf_places, &leaf_places)
-    }
-}
-
-/// The texels of its chart that lie beside a texel towards +u, -u, +v and -v of its sides; itself where there is none.
-fn neighbours(atlas: &Atlas, texel: usize) -> [usize; 4] {
-    let own = &atlas.texels[texel];
-    let mut found = [texel; 4];
-    for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-        let Some(at) = own.at.checked_add_signed(glam::IVec2::new(dx, dy)) else { continue };
-        if at.max_element() >= atlas.resolution {
-            continue;
-        }
-        let index = atlas.texel_at[(at.y * atlas.resolution + at.x) as usize];
-        let Some(other) = atlas.texels.get(index as usize).filter(|other| other.chart == own.chart) else { continue };
-        // Along which side it lies, in widths of the texel.
-        let offset = other.position - own.position;
-        let along =
-            [own.side_u, own.side_v].map(|side| offset.dot(side) / side.length_squared().max(f32::MIN_POSITIVE));
-        let axis = usize::from(along[1].abs() > along[0].abs());
-        found[2 * axis + usize::from(along[axis] < 0.0)] = index as usize;
-    }
-    found
 }
 
 /// The maps of all places before compression, one after the other: what tests hold the compressed ones against.
