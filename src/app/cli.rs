@@ -154,6 +154,9 @@ pub struct PictureArgs {
     /// A setting of the method or of the display, see `linklight methods`; may be repeated
     #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
     pub set: Vec<Assignment>,
+    /// Show this in place of light, see `linklight methods --views`
+    #[arg(long, value_name = "NAME")]
+    pub view: Option<String>,
     /// Change the scene, such as material:3.albedo=0.8,0.2,0.1; material: albedo, roughness, metallic, emission; light:
     /// intensity; node: move (metres); may be repeated
     #[arg(long, value_name = "KIND:N.PROPERTY=VALUE", allow_hyphen_values = true)]
@@ -161,7 +164,6 @@ pub struct PictureArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(args_override_self = true)]
 pub struct RenderArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -189,7 +191,6 @@ pub struct RenderArgs {
 }
 
 #[derive(Debug, Args)]
-#[command(args_override_self = true)]
 pub struct ViewArgs {
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -470,6 +471,9 @@ pub struct DevicesArgs {
 
 #[derive(Debug, Args)]
 pub struct MethodsArgs {
+    /// List the debug views
+    #[arg(long, conflicts_with = "json")]
+    pub views: bool,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

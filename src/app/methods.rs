@@ -4,13 +4,16 @@ use std::io::Write;
 
 use serde_json::{Value, json};
 
-use super::AppError;
 use super::cli::MethodsArgs;
+use super::{AppError, views};
 use crate::display::final_gather;
 use crate::methods::METHODS;
 use crate::methods::settings::{Kind, SettingGroup as _, Spec};
 
 pub fn run(args: &MethodsArgs, out: &mut dyn Write) -> Result<(), AppError> {
+    if args.views {
+        return views::list(out);
+    }
     if args.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&to_json()?)?)?;
         return Ok(());

@@ -36,6 +36,7 @@ mod stage;
 pub mod state;
 pub mod values;
 mod view;
+pub mod views;
 
 use std::io::Write;
 

@@ -13,7 +13,7 @@ use super::interrupt::Interrupt;
 use super::output::Measured;
 use super::stage::Stage;
 use super::values::{CameraChoice, Format, Output, SceneSource};
-use super::{AppError, frame, output};
+use super::{AppError, frame, output, views};
 use crate::display::final_gather;
 pub use crate::display::tone_map::LightParts;
 use crate::gpu::{Capture, Context, Options, prepare_capture};
@@ -150,6 +150,8 @@ impl TryFrom<RenderArgs> for RenderRequest {
 impl RenderRequest {
     /// One frame of the picture that `args` decide, for `output`, and nothing written beside it.
     pub fn of_picture(args: &PictureArgs, output: Output) -> Result<Self, AppError> {
+        let mut args = args.clone();
+        views::resolve(&mut args)?;
         let usage = |message: String| Err(AppError::Usage(message));
         let path_traced = args.method.key == "path-tracing";
         if path_traced && args.display.is_some() {

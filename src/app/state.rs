@@ -42,8 +42,28 @@ pub fn expand(args: impl IntoIterator<Item = OsString>) -> Result<Vec<OsString>,
         None if at < args.len() => args.remove(at).into(),
         None => return Err(AppError::Usage("--state needs a file, such as one that `linklight view` wrote".into())),
     };
-    args.splice(first..first, read(&path)?);
+    let given: Vec<String> = args[first..].iter().filter_map(|arg| option_name(arg.to_str()?)).collect();
+    let lines = read(&path)?;
+    let stays = |line: &OsString| line.to_str().and_then(option_name).is_none_or(|name| !is_overridden(&name, &given));
+    args.splice(first..first, lines.into_iter().filter(stays));
     Ok(args)
+}
+
+/// The name of `--name` or `--name=value`.
+fn option_name(word: &str) -> Option<String> {
+    word.strip_prefix("--").map(|rest| rest.split('=').next().unwrap_or(rest).to_owned())
+}
+
+/// Whether an option of a state gives way to those of the command line. A camera of the scene replaces a free one;
+/// settings and edits add up, the last of each standing.
+fn is_overridden(name: &str, given: &[String]) -> bool {
+    let is_given = |name: &str| given.iter().any(|other| other == name);
+    match name {
+        "set" | "edit" => false,
+        "eye" | "look-at" | "fov" => is_given(name) || is_given("camera"),
+        "direct-only" | "indirect-only" => is_given("direct-only") || is_given("indirect-only"),
+        name => is_given(name),
+    }
 }
 
 fn read(path: &Path) -> Result<Vec<OsString>, AppError> {
@@ -109,6 +129,9 @@ pub fn options(args: &PictureArgs) -> Vec<String> {
     option("seed", args.seed.to_string());
     for set in &args.set {
         option("set", format!("{}={}", set.key, set.value));
+    }
+    if let Some(view) = &args.view {
+        option("view", view.clone());
     }
     for edit in &args.edit {
         option("edit", edit.to_string());
@@ -181,6 +204,17 @@ mod tests {
         line.extend(words("-o a.png"));
         let args = picture(expand(line).unwrap()).unwrap();
         assert_eq!((args.bounces, args.seed), (7, 3));
+
+        write(
+            &file,
+            &picture(words("linklight view a.glb --eye 1,2,3 --look-at 0,0,0 --set rays_per_element=64")).unwrap(),
+        )
+        .unwrap();
+        let mut line = words("linklight render --camera=1 --set smoothing=false -o a.png --state");
+        line.push(file.into());
+        let args = picture(expand(line).unwrap()).unwrap();
+        assert_eq!((args.eye, args.look_at, args.set.len()), (None, None, 2));
+        assert_eq!(args.camera.unwrap().name, "1");
     }
 
     #[test]

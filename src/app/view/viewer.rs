@@ -15,7 +15,7 @@ use super::profiler::Profiler;
 use crate::app::cli::{Display, PictureArgs, ViewArgs};
 use crate::app::render::{FreeCamera, RenderRequest};
 use crate::app::values::{Format, Output};
-use crate::app::{AppError, frame, output, state};
+use crate::app::{AppError, frame, output, state, views};
 use crate::display::tone_map::LightParts;
 use crate::gpu::{Context, MemoryUse, PassRecord, Reload};
 use crate::methods::settings::Assignment;
@@ -83,8 +83,11 @@ pub struct PictureShown<'v> {
 impl Viewer {
     pub fn new(args: &ViewArgs) -> Result<Self, AppError> {
         request(&args.picture)?;
+        let mut picture = args.picture.clone();
+        // The widgets know the setting.
+        views::resolve(&mut picture)?;
         Ok(Self {
-            args: args.picture.clone(),
+            args: picture,
             camera_mode: CameraMode::default(),
             is_playing: false,
             news: News::default(),

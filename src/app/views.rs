@@ -1,0 +1,137 @@
+//! Debug views: what a picture can show in place of light, as one table.
+//!
+//! Methods and display stages declare their views as values of a setting; `--view NAME` sets it, `linklight methods
+//! --views` lists all. Views of one element take it from the setting `pick`, an element's number or a pixel.
+
+use std::io::Write;
+
+use super::AppError;
+use super::cli::{Display, PictureArgs};
+use super::render::displays;
+use crate::display::final_gather;
+use crate::methods::settings::{Assignment, ChoiceValue, Kind, SettingGroup as _, Spec, suggest};
+use crate::methods::{METHODS, Method};
+
+/// Settings whose values are views; the default is light.
+const VIEW_SETTINGS: [&str; 3] = ["view", "show", "gather_shows"];
+
+/// One view, and the setting that asks for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DebugView {
+    pub setting: &'static str,
+    pub value: ChoiceValue,
+}
+
+/// Those of a method, seen through a display stage of its own.
+pub fn of_method(method: &Method) -> Vec<DebugView> {
+    among(&method.specs())
+}
+
+/// Those of the per-pixel final gather, whatever it gathers from.
+pub fn of_final_gather() -> Vec<DebugView> {
+    among(&final_gather::Settings::specs())
+}
+
+fn among(specs: &[Spec]) -> Vec<DebugView> {
+    let mut views = Vec::new();
+    for spec in specs.iter().filter(|spec| VIEW_SETTINGS.contains(&spec.name)) {
+        let Kind::Choice { values } = &spec.kind else { continue };
+        let others = values.iter().filter(|value| spec.default != value.name);
+        views.extend(others.map(|&value| DebugView { setting: spec.name, value }));
+    }
+    views
+}
+
+/// Puts the setting that `--view` stands for in its place.
+pub fn resolve(args: &mut PictureArgs) -> Result<(), AppError> {
+    let Some(name) = args.view.take() else { return Ok(()) };
+    let display = displays(args.method).first().map(|&default| args.display.unwrap_or(default));
+    // A gather shows no colours of elements, and nothing else shows cuts.
+    let (views, of) = match display {
+        Some(Display::FinalGather) => (of_final_gather(), "--display final-gather"),
+        _ => (of_method(args.method), args.method.key),
+    };
+    if let Some(view) = views.iter().find(|view| view.value.name == name) {
+        args.set.push(Assignment { key: view.setting.to_owned(), value: name });
+        return Ok(());
+    }
+    let names: Vec<&str> = views.iter().map(|view| view.value.name).collect();
+    let hint = if names.is_empty() { "it has none".to_owned() } else { suggest(&name, &names) };
+    Err(AppError::Usage(format!("{of} has no view {name:?}; {hint} (linklight methods --views lists all)")))
+}
+
+/// Every view with what it shows.
+pub fn list(out: &mut dyn Write) -> Result<(), AppError> {
+    for method in METHODS {
+        write(out, method.key, &of_method(method))?;
+    }
+    write(out, "--display final-gather", &of_final_gather())
+}
+
+fn write(out: &mut dyn Write, owner: &str, views: &[DebugView]) -> Result<(), AppError> {
+    if !views.is_empty() {
+        writeln!(out, "{owner}")?;
+    }
+    for DebugView { value, .. } in views {
+        writeln!(out, "    --view {:16} {}", value.name, value.doc)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::app::cli::{Cli, Command};
+    use crate::app::render::RenderRequest;
+    use crate::app::values::{Format, Output};
+
+    fn request(options: &str) -> Result<RenderRequest, String> {
+        let line = format!("linklight view builtin:maze {options}");
+        let cli = Cli::try_parse_from(line.split_whitespace()).map_err(|error| error.to_string())?;
+        let Command::View(args) = cli.command else { return Err("no view".into()) };
+        let output = Output { path: "a.png".into(), format: Format::Png };
+        RenderRequest::of_picture(&args.picture, output).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_view_is_the_setting_it_stands_for() {
+        let mut count = 0;
+        for method in METHODS {
+            for view in of_method(method) {
+                let name = view.value.name;
+                let by_name = request(&format!("--method {} --view {name}", method.key)).unwrap();
+                let by_setting = request(&format!("--method {} --set {}={name}", method.key, view.setting)).unwrap();
+                assert_eq!(by_name.assignments, by_setting.assignments);
+                assert_ne!(by_name.assignments, request(&format!("--method {}", method.key)).unwrap().assignments);
+                count += 1;
+            }
+        }
+        assert!(count >= 10, "{count} views of methods");
+        let gather = request("--display final-gather --view cut-size").unwrap();
+        assert_eq!(
+            gather.display_assignments,
+            request("--display final-gather --set gather_shows=cut-size").unwrap().display_assignments
+        );
+    }
+
+    #[test]
+    fn what_is_no_view_is_refused_with_those_there_are() {
+        let refused = |options: &str| request(options).unwrap_err();
+        assert!(refused("--view charts").contains("has none"), "explicit visibility has no views");
+        assert!(refused("--method implicit-visibility --view chart").contains("charts"));
+        assert!(refused("--method implicit-visibility --display final-gather --view charts").contains("cut-size"));
+        assert!(refused("--method antiradiance --view radiance").contains("no view"), "light is no debug view");
+    }
+
+    #[test]
+    fn the_list_has_every_view() {
+        let mut text = Vec::new();
+        list(&mut text).unwrap();
+        let text = String::from_utf8(text).unwrap();
+        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size"] {
+            assert!(text.contains(&format!("--view {name} ")), "{name} in\n{text}");
+        }
+    }
+}
