@@ -14,5 +14,6 @@ mod kernels;
 mod physics;
 mod places;
 mod schemes;
+mod splatting;
 mod support;
 mod twins;
