@@ -12,7 +12,7 @@ use super::diff::Limit;
 use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
-    parse_glb, parse_measuring_seconds, parse_method, parse_place, parse_scale, parse_size, parse_turn,
+    parse_glb, parse_measuring_seconds, parse_method, parse_place, parse_scale, parse_size, parse_turn, parse_wall,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -71,6 +71,10 @@ pub enum Command {
     Bench(BenchArgs),
     /// Hold every table and figure of the methods' papers to what is measured here: a page
     Papers(PapersArgs),
+    /// Measure how much light each method lets through closed walls
+    Leak(LeakArgs),
+    /// Measure how long each method takes until a change of the lights is seen
+    Lag(LagArgs),
     /// Write a method's solution into the scene: vertex colours, a lightmap, or light by direction
     Bake(BakeArgs),
     /// Print how far picture A is from reference B
@@ -356,6 +360,64 @@ pub struct PapersArgs {
     /// Print the data of the page (DIR/papers.json) as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct LeakArgs {
+    /// Measurements to write
+    #[arg(short, long, value_name = "FILE.json")]
+    pub output: Option<PathBuf>,
+    /// Method, see `linklight methods`; may be repeated [default: all]
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub method: Vec<&'static Method>,
+    /// Thicknesses of the wall, millimetres
+    #[arg(long, value_name = "MM,...", value_delimiter = ',', default_value = "0,1,5,20,50,100", value_parser = parse_wall)]
+    pub walls: Vec<u32>,
+    /// Materials of the walls
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "SIDES,...", default_value = "one,two")]
+    pub sides: Vec<WallSides>,
+    /// A setting, for every method that has it; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// Fail (exit code 1) if a larger share of the light comes through
+    #[arg(long, value_name = "SHARE", value_parser = parse_fraction)]
+    pub fail_above: Option<f64>,
+    /// Options of `linklight render` for all pictures, such as -- --size 96x54 --elements 4000
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    pub options: Vec<String>,
+}
+
+/// Sides from which walls are seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WallSides {
+    One,
+    Two,
+}
+
+#[derive(Debug, Args)]
+pub struct LagArgs {
+    /// .gltf or .glb files with punctual lights, or builtin:NAME
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<SceneSource>,
+    /// Measurements to write
+    #[arg(short, long, value_name = "FILE.json")]
+    pub output: Option<PathBuf>,
+    /// Method, see `linklight methods`; may be repeated [default: all]
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub method: Vec<&'static Method>,
+    /// A setting, for every method that has it; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", value_parser = Assignment::parse)]
+    pub set: Vec<Assignment>,
+    /// How near to its final state a picture must be, as a share of its mean
+    #[arg(long, value_name = "SHARE", default_value_t = 0.05, value_parser = parse_fraction)]
+    pub within: f64,
+    /// Frames after which a picture is given up
+    #[arg(long, value_name = "N", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub frames: u32,
+    /// Options of `linklight render` for all pictures, such as -- --size 96x54 --elements 4000
+    #[arg(last = true, value_name = "RENDER OPTIONS")]
+    pub options: Vec<String>,
 }
 
 #[derive(Debug, Args)]

@@ -2,6 +2,7 @@
 //! other; this is where they meet.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use crate::gpu;
 use crate::report::profile::{Device, Memory, MemoryOwner, PassRecord};
@@ -50,6 +51,11 @@ pub fn memory(owners: &BTreeMap<String, gpu::MemoryUse>) -> Memory {
 /// Where the device's clock lies on the time line.
 pub fn clock(context: &gpu::Context, time_line: &TimeLine) -> Clock {
     time_line.calibrate(|| context.calibrate().map(|pair| (pair.device_ns, pair.max_deviation_ns)))
+}
+
+/// Since `start`, on the CPU's clock.
+pub fn milliseconds(start: Instant) -> f64 {
+    start.elapsed().as_secs_f64() * 1e3
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@
 //! | [`mod@view`] | `linklight view`: a scene in a window |
 //! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
+//! | [`leak`] | `linklight leak`: light through closed walls, by method |
+//! | [`lag`] | `linklight lag`: frames until a change of the lights is seen |
 //! | [`papers`] | `linklight papers`: the papers' tables and figures, measured here |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
 //! | [`devices`] | `linklight devices`: GPUs, usable or not |
@@ -25,6 +27,8 @@ pub mod edits;
 mod error;
 mod frame;
 pub mod interrupt;
+pub mod lag;
+pub mod leak;
 pub mod measure;
 pub mod methods;
 mod on_elements;
@@ -67,6 +71,14 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
         cli::Command::Papers(args) => {
             let interrupt = interrupt::Interrupt::install();
             papers::run(&args, &cli.global, &console, &interrupt, out)
+        }
+        cli::Command::Leak(args) => {
+            let interrupt = interrupt::Interrupt::install();
+            leak::run(&args, &cli.global, &console, &interrupt, out)
+        }
+        cli::Command::Lag(args) => {
+            let interrupt = interrupt::Interrupt::install();
+            lag::run(&args, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
         cli::Command::Devices(args) => devices::run(&args, &cli.global, out),

@@ -207,6 +207,14 @@ pub fn parse_scale(text: &str) -> Result<f32, String> {
     }
 }
 
+/// `--walls`.
+pub fn parse_wall(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(wall) if wall <= builtin::MAX_WALL => Ok(wall),
+        _ => Err(format!("a wall is 0 to {} millimetres thick", builtin::MAX_WALL)),
+    }
+}
+
 /// A scene to write.
 pub fn parse_glb(text: &str) -> Result<PathBuf, String> {
     match extension(Path::new(text)).as_str() {

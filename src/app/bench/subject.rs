@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use crate::app::compare::plan::Run;
+use crate::app::measure::milliseconds;
 use crate::app::stage::Stage;
 use crate::app::{AppError, frame, measure, render};
 use crate::gpu::Context;
@@ -94,8 +95,4 @@ impl<'w> Subject<'w> {
 fn times(values: Vec<f64>) -> Result<Times, AppError> {
     let estimate = Estimate::of(&values).ok_or_else(|| AppError::failed("nothing was measured"))?;
     Ok(Times { estimate, values })
-}
-
-pub fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use super::subject::milliseconds;
+use crate::app::measure::milliseconds;
 use crate::app::{AppError, measure};
 use crate::gpu::shaders::yardstick::{MultiplyAdd, MultiplyAddParams, Nothing, NothingParams};
 use crate::gpu::{Buffer, Context};

@@ -5,6 +5,7 @@ use std::time::Instant;
 use glam::Vec3;
 
 use super::plan::Run;
+use crate::app::measure::milliseconds;
 use crate::app::stage::Stage;
 use crate::app::{AppError, frame, measure, render};
 use crate::methods::path_tracing::{Options, PathTracing};
@@ -133,8 +134,4 @@ pub fn path_tracing_curve(
 pub fn mean(picture: &Picture) -> f64 {
     let sum: f64 = picture.rgb.iter().map(|pixel: &Vec3| f64::from(pixel.element_sum())).sum();
     sum / (3.0 * picture.rgb.len().max(1) as f64)
-}
-
-fn milliseconds(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

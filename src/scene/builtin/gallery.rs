@@ -64,7 +64,7 @@ fn sculpt(statue: &Statue, triangles: usize) -> Shape {
     if found.abs_diff(triangles) * 20 > triangles { mesh(finer(estimate, found)) } else { shape }
 }
 
-fn add(scene: &mut Scene, name: &str, material: u32, shape: Shape) {
+pub(super) fn add(scene: &mut Scene, name: &str, material: u32, shape: Shape) {
     let primitive = Primitive {
         positions: shape.positions,
         normals: shape.normals,
@@ -77,7 +77,7 @@ fn add(scene: &mut Scene, name: &str, material: u32, shape: Shape) {
     scene.nodes.push(Node { name: name.into(), mesh, ..Node::default() });
 }
 
-fn material(name: &str, color: [f32; 3], metallic: f32, roughness: f32) -> Material {
+pub(super) fn material(name: &str, color: [f32; 3], metallic: f32, roughness: f32) -> Material {
     let base_color = Vec3::from(color).extend(1.0);
     Material { name: name.into(), base_color, metallic, roughness, ..Material::default() }
 }
@@ -108,7 +108,7 @@ fn materials() -> Vec<Material> {
 }
 
 /// Camera or light nodes look along their -Z.
-fn looking(from: [f32; 3], to: [f32; 3]) -> Transform {
+pub(super) fn looking(from: [f32; 3], to: [f32; 3]) -> Transform {
     let back = (Vec3::from(from) - Vec3::from(to)).normalize_or(Vec3::Z);
     let up = if back.y.abs() > 0.999 { Vec3::NEG_Z } else { Vec3::Y };
     let right = up.cross(back).normalize_or(Vec3::X);

@@ -1,14 +1,18 @@
 //! The scenes that come with the program, by name: `builtin:NAME` on the command line.
 //!
 //! Most are .glb files in `assets/`, made by `tools/make_scenes` and kept inside the binary. The gallery is made when it
-//! is loaded, with as many triangles as asked: `builtin:gallery?triangles=1500000`.
+//! is loaded, with as many triangles as asked: `builtin:gallery?triangles=1500000`; so are the closed rooms, with a wall as
+//! thick as asked: `builtin:closed-rooms?wall=20&sides=two`.
 
+mod closed_rooms;
 mod gallery;
 mod statues;
 
 use super::{LoadOptions, Scene, SceneError, load, load_bytes_with};
 use std::path::Path;
 use thiserror::Error;
+
+pub use closed_rooms::{ClosedRooms, MAX_WALL};
 
 /// What a scene argument must start with to name a built-in scene.
 pub const PREFIX: &str = "builtin:";
@@ -29,6 +33,8 @@ pub enum Source {
     File(&'static [u8]),
     /// Made on the spot, with about so many triangles.
     Gallery { triangles: u32 },
+    /// Made on the spot.
+    ClosedRooms(ClosedRooms),
 }
 
 #[derive(Debug, Error, PartialEq, Eq)]
@@ -45,6 +51,11 @@ pub enum BuiltinError {
         gallery::DEFAULT_TRIANGLES
     )]
     GalleryParameters { parameters: String },
+    #[error(
+        "built-in scene 'closed-rooms' does not understand '{parameters}'; it takes wall=MM with MM from 0 to {MAX_WALL} \
+         and sides=one or sides=two, as in builtin:closed-rooms?wall=20&sides=two"
+    )]
+    ClosedRoomsParameters { parameters: String },
     #[error(
         "built-in scene 'gallery' with {triangles} triangles needs {needed} bytes to be made, more than the {allowed} \
          allowed; ask for fewer triangles or allow more memory"
@@ -72,13 +83,18 @@ macro_rules! file {
 }
 
 /// All built-in scenes, simplest first.
-pub static BUILTINS: [Builtin; 12] = [
+pub static BUILTINS: [Builtin; 13] = [
     file!("cornell-box", "the Cornell box as measured: two boxes under an area light"),
     file!("cornell-empty", "the Cornell box without its boxes"),
     file!("furnace", "closed room, albedo 0.5 and radiance 1 everywhere: after k bounces 2 - 2^-k"),
     file!("parallel-plates", "unit squares face to face at distance 1: form factor 0.199825"),
     file!("perpendicular-plates", "unit squares sharing an edge: form factor 0.200044"),
     file!("two-rooms", "a lit and a dark room with a closed door between them"),
+    Builtin {
+        name: "closed-rooms",
+        description: "a lit and a dark room, nothing between them but a wall; closed-rooms?wall=MM&sides=one|two",
+        source: Source::ClosedRooms(ClosedRooms { wall: 50, two_sided: false }),
+    },
     file!("maze", "partitions lit only indirectly: the sun meets a wall the viewer cannot see"),
     file!("office", "sun and sky through a window, desk, shelves of books, chairs; textures"),
     file!("tea-room", "silver, copper and glazed pots on a table, arched windows, a lamp; glossy and metallic"),
@@ -107,6 +123,10 @@ pub fn resolve(name: &str) -> Result<Source, BuiltinError> {
                 None => Err(BuiltinError::GalleryParameters { parameters: parameters.into() }),
             }
         }
+        Source::ClosedRooms(_) => match ClosedRooms::parse(parameters) {
+            Some(rooms) => Ok(Source::ClosedRooms(rooms)),
+            None => Err(BuiltinError::ClosedRoomsParameters { parameters: parameters.into() }),
+        },
         source => Ok(source),
     }
 }
@@ -119,6 +139,7 @@ pub fn open(scene: &str, options: &LoadOptions) -> Result<Scene, OpenError> {
     match scene.strip_prefix(PREFIX) {
         Some(name) => match resolve(name)? {
             Source::File(bytes) => Ok(load_bytes_with(scene, bytes, options)?),
+            Source::ClosedRooms(rooms) => Ok(rooms.scene()),
             Source::Gallery { triangles } => {
                 let (needed, allowed) = (u64::from(triangles) * gallery::BYTES_PER_TRIANGLE, options.max_memory_bytes);
                 if needed > allowed {
