@@ -12,7 +12,8 @@ use super::diff::Limit;
 use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
-    parse_glb, parse_measuring_seconds, parse_method, parse_place, parse_scale, parse_size, parse_turn, parse_wall,
+    parse_glb, parse_measuring_seconds, parse_method, parse_method_or_auto, parse_place, parse_scale, parse_size,
+    parse_turn, parse_wall,
 };
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
@@ -79,6 +80,8 @@ pub enum Command {
     Bake(BakeArgs),
     /// Print how far picture A is from reference B
     Diff(DiffArgs),
+    /// Find the first pass in which two runs of `linklight render --hashes` part
+    Diverge(DivergeArgs),
     /// List the GPUs, usable or not, and what they offer
     Devices(DevicesArgs),
     /// List the methods and their settings
@@ -94,8 +97,8 @@ pub struct PictureArgs {
     /// Take SCENE and options from a state file, which `linklight view` writes; further options override it
     #[arg(long, value_name = "FILE")]
     pub state: Option<PathBuf>,
-    /// Method, see `linklight methods`
-    #[arg(long, value_name = "KEY", value_parser = parse_method, default_value = "explicit-visibility")]
+    /// Method, see `linklight methods`; with --target-error also auto
+    #[arg(long, value_name = "KEY", value_parser = parse_method_or_auto, default_value = "explicit-visibility")]
     pub method: &'static Method,
     /// How the solution becomes pixels [default: vertex; final-gather for surface-shadow-maps; path-tracing has none]
     #[arg(long, value_enum)]
@@ -174,6 +177,9 @@ pub struct RenderArgs {
     /// Picture to write: .exr holds linear radiance, .png what a display shows
     #[arg(short, long, value_name = "FILE.exr|FILE.png")]
     pub output: Output,
+    /// Pick settings by pilot runs, and with --method auto the method, for this relative MSE
+    #[arg(long, value_name = "ERROR", value_parser = parse_fraction, conflicts_with_all = ["elements", "spp"])]
+    pub target_error: Option<f64>,
     /// Frames to compute; the last one is written
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
@@ -192,6 +198,9 @@ pub struct RenderArgs {
     /// Write a RenderDoc capture of the last frame
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+    /// Write hashes of what every pass leaves in its buffers, for `linklight diverge`
+    #[arg(long, value_name = "FILE.json")]
+    pub hashes: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -477,6 +486,25 @@ pub enum BakeMaterials {
     Unlit,
     /// The scene's own: for programs that apply the light themselves
     Original,
+}
+
+#[derive(Debug, Args)]
+pub struct DivergeArgs {
+    /// Hashes of one run
+    #[arg(value_name = "A.json")]
+    pub a: PathBuf,
+    /// Hashes of another, by another driver or version
+    #[arg(value_name = "B.json")]
+    pub b: PathBuf,
+    /// Hashes of the first run made again: what differs there has no order of its own and is passed over
+    #[arg(long, value_name = "A2.json")]
+    pub again: Option<PathBuf>,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Fail (exit code 1) if the runs differ
+    #[arg(long)]
+    pub fail: bool,
 }
 
 #[derive(Debug, Args)]

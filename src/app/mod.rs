@@ -11,6 +11,7 @@
 //! | [`lag`] | `linklight lag`: frames until a change of the lights is seen |
 //! | [`papers`] | `linklight papers`: the papers' tables and figures, measured here |
 //! | [`diff`] | `linklight diff`: error figures of two pictures |
+//! | [`diverge`] | `linklight diverge`: the first pass in which two runs part |
 //! | [`devices`] | `linklight devices`: GPUs, usable or not |
 //! | [`methods`] | `linklight methods`: methods and their settings |
 //!
@@ -23,6 +24,7 @@ pub mod compare;
 pub mod console;
 pub mod devices;
 pub mod diff;
+pub mod diverge;
 pub mod edits;
 mod error;
 mod frame;
@@ -38,6 +40,7 @@ pub mod papers;
 pub mod render;
 mod stage;
 pub mod state;
+mod target;
 pub mod values;
 mod view;
 pub mod views;
@@ -81,6 +84,7 @@ pub fn run(cli: cli::Cli, out: &mut dyn Write) -> Result<(), AppError> {
             lag::run(&args, &cli.global, &console, &interrupt, out)
         }
         cli::Command::Diff(args) => diff::run(&args, out),
+        cli::Command::Diverge(args) => diverge::run(&args, out),
         cli::Command::Devices(args) => devices::run(&args, &cli.global, out),
         cli::Command::Methods(args) => methods::run(&args, out),
     }

@@ -1,6 +1,7 @@
 //! What a render leaves behind: the picture with its metadata, the profile, the trace, the table of passes.
 
 use std::io::Write;
+use std::path::Path;
 
 use serde_json::{Map, Value, json};
 
@@ -10,6 +11,7 @@ use super::render::RenderRequest;
 use super::values::Format;
 use crate::gpu;
 use crate::report::image::{self, Metadata, Picture};
+use crate::report::pass_hashes::{self, HashFile, PassHash};
 use crate::report::profile::{Profile, SceneFacts};
 use crate::report::table;
 use crate::report::trace::{self, TimeLine};
@@ -83,4 +85,21 @@ pub fn metadata(request: &RenderRequest, device: &gpu::DeviceInfo) -> Result<Met
         ("settings", json!(request.record()?).to_string()),
     ];
     Ok(facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect())
+}
+
+/// Write what every pass left in its buffers, as hashes.
+pub fn write_hashes(request: &RenderRequest, context: &gpu::Context, path: &Path) -> Result<(), AppError> {
+    let of_pass = |hash: gpu::PassHash| {
+        PassHash::of_words(hash.path, hash.binding, hash.word_count, hash.words_per_block, hash.blocks)
+    };
+    let file = HashFile {
+        schema: pass_hashes::SCHEMA.to_owned(),
+        version: pass_hashes::VERSION,
+        program: concat!("linklight ", env!("CARGO_PKG_VERSION")).to_owned(),
+        device: measure::device(context.info()),
+        scene: request.scene.to_string(),
+        settings: request.record()?,
+        passes: context.take_hashes().into_iter().map(of_pass).collect(),
+    };
+    file.write(path).map_err(AppError::failed)
 }

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::time::Instant;
 
 use glam::Vec3;
 use serde_json::{Map, Value, json};
@@ -10,15 +11,17 @@ use super::cli::{Channel, Display, Global, PictureArgs, Rays, RenderArgs};
 use super::console::{Console, Verbosity, Watcher};
 use super::edits::Edit;
 use super::interrupt::Interrupt;
+use super::measure::milliseconds;
 use super::output::Measured;
 use super::stage::Stage;
+use super::target::{self, Picked, Target};
 use super::values::{CameraChoice, Format, Output, SceneSource};
 use super::{AppError, frame, output, views};
 use crate::display::final_gather;
 pub use crate::display::tone_map::LightParts;
 use crate::gpu::{Capture, Context, Options, prepare_capture};
-use crate::methods::Method;
 use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
+use crate::methods::{AUTO, METHODS, Method};
 use crate::report::tonemap::ToneSettings;
 use crate::report::trace::TimeLine;
 use crate::report::write::check_writable;
@@ -77,6 +80,9 @@ pub struct RenderRequest {
     pub profile: Option<PathBuf>,
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
+    pub hashes: Option<PathBuf>,
+    /// Settings are picked for this error first.
+    pub target: Option<Target>,
 }
 
 /// The display stages that can show a method's solution, the default first; none for one with pixels of its own.
@@ -118,14 +124,23 @@ impl TryFrom<RenderArgs> for RenderRequest {
             let output = args.output.path.display();
             return usage(format!("--channels needs an .exr; {output} is a .png and has no room for them"));
         }
-        let key = args.picture.method.key;
+        let any_method = args.picture.method.key == AUTO.key;
+        if any_method && args.target_error.is_none() {
+            return usage("--method auto needs to know what for: give --target-error too".into());
+        }
+        if any_method && (!args.picture.set.is_empty() || args.picture.display.is_some()) {
+            return usage("--method auto picks settings and display too; leave out --set and --display".into());
+        }
+        let method = if any_method { &METHODS[0] } else { args.picture.method };
+        let picture = PictureArgs { method, ..args.picture };
+        let key = method.key;
         if args.lightmap.is_some() && key != "surface-shadow-maps" {
             return usage(format!("--lightmap needs --method surface-shadow-maps; {key} has no atlas"));
         }
-        let mut request = Self::of_picture(&args.picture, args.output)?;
+        let mut request = Self::of_picture(&picture, args.output)?;
 
         let mut written = vec![&request.output.path];
-        written.extend([&args.lightmap, &args.profile, &args.trace, &args.capture].into_iter().flatten());
+        written.extend([&args.lightmap, &args.profile, &args.trace, &args.capture, &args.hashes].into_iter().flatten());
         for (index, path) in written.iter().enumerate() {
             if written[..index].contains(path) {
                 return usage(format!("two outputs are called {}; give each its own name", path.display()));
@@ -143,6 +158,8 @@ impl TryFrom<RenderArgs> for RenderRequest {
         request.profile = args.profile;
         request.trace = args.trace;
         request.capture = args.capture;
+        request.hashes = args.hashes;
+        request.target = args.target_error.map(|error| Target { error, any_method });
         Ok(request)
     }
 }
@@ -153,7 +170,11 @@ impl RenderRequest {
         let mut args = args.clone();
         views::resolve(&mut args)?;
         let usage = |message: String| Err(AppError::Usage(message));
-        let path_traced = args.method.key == "path-tracing";
+        let method = args.method;
+        if method.key == AUTO.key {
+            return usage("--method auto is for `linklight render --target-error`".into());
+        }
+        let path_traced = method.key == "path-tracing";
         if path_traced && args.display.is_some() {
             return usage(
                 "--display applies to methods that solve on elements; path-tracing has pixels of its own".into(),
@@ -162,10 +183,10 @@ impl RenderRequest {
         if args.indirect_only && args.bounces == 0 {
             return usage("--indirect-only with --bounces 0 is black everywhere; ask for at least 1 bounce".into());
         }
-        let displays = displays(args.method);
+        let displays = displays(method);
         let display = displays.first().map(|&default| args.display.unwrap_or(default));
         if display.is_some_and(|shown| !displays.contains(&shown)) {
-            let key = args.method.key;
+            let key = method.key;
             let (what, others) = if displays.contains(&Display::Lightmap) {
                 ("texels, not vertices", "final-gather or lightmap")
             } else if displays.contains(&Display::IrradianceVector) {
@@ -178,7 +199,7 @@ impl RenderRequest {
             return usage(format!("{key} solves on {what}; show it by --display {others}"));
         }
         let (of_display, of_method) = split_assignments(display, args.set.clone());
-        args.method.record(&of_method)?;
+        method.record(&of_method)?;
         final_gather::Settings::from_assignments(&of_display)?;
 
         let free_camera = match (args.eye, args.look_at) {
@@ -191,7 +212,7 @@ impl RenderRequest {
         Ok(Self {
             scene: args.scene.clone(),
             output,
-            method: args.method,
+            method,
             display,
             bounces: args.bounces,
             width: args.size.0,
@@ -221,6 +242,8 @@ impl RenderRequest {
             profile: None,
             trace: None,
             capture: None,
+            hashes: None,
+            target: None,
         })
     }
 
@@ -283,8 +306,27 @@ impl RenderRequest {
     }
 }
 
-/// Render and write what was asked for.
+/// Render and write what was asked for, by settings picked for an error where that was asked for.
 pub fn run(
+    request: &RenderRequest,
+    global: &Global,
+    console: &Console,
+    interrupt: &Interrupt,
+    out: &mut dyn Write,
+) -> Result<(), AppError> {
+    let Some(target) = request.target else { return render(request, global, console, interrupt, out) };
+    let watch = Watcher::new(console, interrupt);
+    let mut say = |line: String| -> Result<(), AppError> { Ok(writeln!(out, "{line}")?) };
+    let Picked { request, predicted, achieved, words } = target::pick(request, target, global, &watch, &mut say)?;
+    let start = Instant::now();
+    render(&request, global, console, interrupt, out)?;
+    writeln!(out, "picked {words}")?;
+    writeln!(out, "predicted relative MSE {:.4}, {:.0} ms", predicted.error, predicted.ms)?;
+    writeln!(out, "achieved relative MSE {:.4} (by a pilot), {:.0} ms", achieved.error, milliseconds(start))?;
+    Ok(())
+}
+
+fn render(
     request: &RenderRequest,
     global: &Global,
     console: &Console,
@@ -295,7 +337,8 @@ pub fn run(
         prepare_capture()?;
     }
     let time_line = TimeLine::default();
-    let context = time_line.span("open device", || open_device(global, request.profile.is_some()))?;
+    let counts = Counts { statistics: request.profile.is_some(), hashes: request.hashes.is_some() };
+    let context = time_line.span("open device", || open_counting_device(global, counts))?;
     let device = context.info();
     tracing::info!("device {} {} ({})", device.index, device.name, device.driver);
     let mut capture = request.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
@@ -332,16 +375,31 @@ pub fn run(
     } else {
         output::write_measurements(request, measured, &mut io::sink())?;
     }
+    if let Some(path) = &request.hashes {
+        output::write_hashes(request, &context, path)?;
+    }
     check_validation(&context)?;
     partial.map_or(Ok(()), Err)
 }
 
 /// The device of the global options; `statistics` counts what each pass does.
 pub fn open_device(global: &Global, statistics: bool) -> Result<Context, AppError> {
+    open_counting_device(global, Counts { statistics, hashes: false })
+}
+
+/// What is kept of every pass.
+#[derive(Debug, Clone, Copy)]
+struct Counts {
+    statistics: bool,
+    hashes: bool,
+}
+
+fn open_counting_device(global: &Global, counts: Counts) -> Result<Context, AppError> {
     let options = Options {
         gpu: global.gpu.clone(),
         validation: global.validate,
-        statistics,
+        statistics: counts.statistics,
+        hash_passes: counts.hashes,
         pipeline_cache: pipeline_cache(),
         ..Options::default()
     };

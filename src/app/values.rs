@@ -134,6 +134,11 @@ pub fn parse_method(text: &str) -> Result<&'static Method, String> {
     })
 }
 
+/// `--method` of one picture: a method, or [`methods::AUTO`].
+pub fn parse_method_or_auto(text: &str) -> Result<&'static Method, String> {
+    if text == methods::AUTO.key { Ok(&methods::AUTO) } else { parse_method(text) }
+}
+
 /// `--size`.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let form = || "expected WIDTHxHEIGHT in pixels, such as 960x540".to_owned();

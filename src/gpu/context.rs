@@ -5,6 +5,7 @@ use super::error::{Checked, GpuError};
 use super::features::OptionalFeatures;
 use super::image::{Image, ImageDescription, Sampler, SamplerDescription, TextureTable};
 use super::instance::Instance;
+use super::pass_hashes::PassHash;
 use super::pipelines::Pipelines;
 use super::profiler::{ClockPair, PassRecord};
 use super::recorder::{CommandSlot, PASSES_PER_POOL, Recorder};
@@ -27,6 +28,8 @@ pub struct Options {
     pub full_barriers: bool,
     /// Leave every barrier out. Only to show that validation sees it.
     pub skip_barriers: bool,
+    /// Hash what every compute pass writes; see [`Context::take_hashes`].
+    pub hash_passes: bool,
     /// Count invocations and primitives per pass where the device can.
     pub statistics: bool,
     /// Pretend to lack every optional feature.
@@ -55,6 +58,7 @@ pub struct Context {
     pub(super) queue_lock: Mutex<()>,
     slots: Mutex<Vec<CommandSlot>>,
     records: Mutex<Vec<PassRecord>>,
+    hashes: Mutex<Vec<PassHash>>,
     // Dropped last: everything above is made on it.
     pub(super) device: Arc<Device>,
 }
@@ -79,6 +83,7 @@ impl Context {
             queue_lock: Mutex::default(),
             slots: Mutex::default(),
             records: Mutex::default(),
+            hashes: Mutex::default(),
             device,
         })
     }
@@ -108,7 +113,14 @@ impl Context {
 
     /// A buffer of `len` elements with undefined content. Names are `owner/what`.
     pub fn buffer<T>(&self, name: &str, len: usize) -> Result<Buffer<T>, GpuError> {
-        Buffer::new(&self.device, name, len)
+        let buffer = Buffer::new(&self.device, name, len)?;
+        if self.options.hash_passes {
+            // What no pass writes is hashed too.
+            let mut recorder = self.recorder("new buffer")?;
+            recorder.fill(&buffer, 0);
+            recorder.submit()?;
+        }
+        Ok(buffer)
     }
 
     /// `len` texels of four words with undefined content.
@@ -217,6 +229,15 @@ impl Context {
             }
             (error, _) => error,
         }
+    }
+
+    /// What the passes left in their buffers since the last call, in order; empty without [`Options::hash_passes`].
+    pub fn take_hashes(&self) -> Vec<PassHash> {
+        std::mem::take(&mut lock(&self.hashes))
+    }
+
+    pub(super) fn append_hashes(&self, hashes: impl IntoIterator<Item = PassHash>) {
+        lock(&self.hashes).extend(hashes);
     }
 
     pub(super) fn append_records(&self, records: Vec<PassRecord>) {

@@ -108,6 +108,11 @@ impl<'b> Bindings<'b> {
         self.resources.push(Resource { id: buffer.id(), bytes: buffer.size_bytes(), handle: Handle::Buffer(info) });
     }
 
+    /// A buffer known by its handle alone.
+    pub(super) fn raw_buffer(&mut self, id: u64, bytes: u64, info: vk::DescriptorBufferInfo) {
+        self.resources.push(Resource { id, bytes, handle: Handle::Buffer(info) });
+    }
+
     pub fn texel_buffer(&mut self, texels: &'b TexelBuffer) {
         let handle = Handle::TexelBuffer([texels.view()]);
         self.resources.push(Resource { id: texels.buffer().id(), bytes: texels.size_bytes(), handle });

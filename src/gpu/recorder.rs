@@ -1,11 +1,13 @@
 //! The recorder: every pass is labelled, timed, counted and synchronised here, in one place, always.
 
 use super::context::Context;
+use super::descriptors::push_descriptors;
 use super::error::{Checked, GpuError};
 use super::hazards::{Access, Hazards};
 use super::image::Image;
-use super::pass::{Bindings, Handle, Pass, Program};
-use super::pipelines::{Bound, RasterState, descriptor_type, stage_flags};
+use super::pass::{Bindings, Pass, Program};
+use super::pass_hashes::PendingHashes;
+use super::pipelines::{Bound, RasterState, stage_flags};
 use super::profiler::Cost;
 use super::{Buffer, RawBuffer};
 use ash::vk;
@@ -87,6 +89,7 @@ pub struct Recorder<'c> {
     hazards: Hazards,
     pub(super) staging: Vec<RawBuffer>,
     pub(super) error: Option<GpuError>,
+    pub(super) hashes: PendingHashes,
 }
 
 impl<'c> Recorder<'c> {
@@ -102,6 +105,7 @@ impl<'c> Recorder<'c> {
             hazards: Hazards::default(),
             staging: Vec::new(),
             error: None,
+            hashes: PendingHashes::default(),
         };
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the slot's command buffer is idle and freshly reset.
@@ -150,12 +154,23 @@ impl<'c> Recorder<'c> {
     pub fn dispatch_counted<P: Pass>(&mut self, pass: &P, threads: impl Into<Threads>, cost: Option<Cost>) {
         let mut bindings = Bindings::default();
         pass.bind(&mut bindings);
-        let (groups, count) = match self.groups(P::PROGRAM, threads.into()) {
+        self.dispatch_bound(P::PROGRAM, &bindings, threads.into(), cost);
+    }
+
+    /// As [`Self::dispatch_counted`], of bindings collected before.
+    pub(super) fn dispatch_bound(
+        &mut self,
+        program: &'static Program,
+        bindings: &Bindings<'_>,
+        threads: Threads,
+        cost: Option<Cost>,
+    ) {
+        let (groups, count) = match self.groups(program, threads) {
             Ok(Some(groups)) => groups,
             Ok(None) => return,
             Err(error) => return self.fail(error),
         };
-        self.compute(P::PROGRAM, &bindings, &[], cost, count, |device, commands| {
+        self.compute(program, bindings, &[], cost, count, |device, commands| {
             // SAFETY: the pipeline and all its bindings are bound; the group counts are within limits.
             unsafe { device.raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]) }
         });
@@ -265,9 +280,14 @@ impl<'c> Recorder<'c> {
         command: impl FnOnce(&super::device::Device, vk::CommandBuffer),
     ) {
         match self.context.pipelines.compute(program, &bindings.constants) {
-            Ok(bound) => self.record(program, bindings, extra, cost, count, bound, |recorder| {
-                command(&recorder.context.device, recorder.commands());
-            }),
+            Ok(bound) => {
+                self.record(program, bindings, extra, cost, count, bound, |recorder| {
+                    command(&recorder.context.device, recorder.commands());
+                });
+                if self.context.options.hash_passes {
+                    self.hash_outputs(program, bindings);
+                }
+            }
             Err(error) => self.fail(error),
         }
     }
@@ -453,45 +473,4 @@ fn bytes(program: &Program, bindings: &Bindings<'_>, read: bool) -> u64 {
         .zip(&bindings.resources)
         .filter(|(info, _)| if read { info.reads } else { info.writes });
     used.map(|(_, resource)| resource.bytes).sum()
-}
-
-unsafe fn push_descriptors(
-    device: &super::device::Device,
-    commands: vk::CommandBuffer,
-    point: vk::PipelineBindPoint,
-    layout: vk::PipelineLayout,
-    program: &Program,
-    bindings: &Bindings<'_>,
-) {
-    let structures: Vec<[vk::AccelerationStructureKHR; 1]> = bindings
-        .resources
-        .iter()
-        .map(|r| match r.handle {
-            Handle::AccelerationStructure(raw) => [raw],
-            _ => [vk::AccelerationStructureKHR::null()],
-        })
-        .collect();
-    let mut structure_writes: Vec<_> = structures
-        .iter()
-        .map(|s| vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(s))
-        .collect();
-    let mut writes = Vec::with_capacity(bindings.resources.len());
-    for ((info, resource), structure) in program.bindings.iter().zip(&bindings.resources).zip(&mut structure_writes) {
-        let write =
-            vk::WriteDescriptorSet::default().dst_binding(info.binding).descriptor_type(descriptor_type(info.kind));
-        writes.push(match &resource.handle {
-            Handle::Buffer(buffer) => write.buffer_info(std::slice::from_ref(buffer)),
-            Handle::TexelBuffer(view) => write.texel_buffer_view(view),
-            Handle::Image(image) => write.image_info(std::slice::from_ref(image)),
-            Handle::AccelerationStructure(_) => {
-                let mut write = write.push_next(structure);
-                write.descriptor_count = 1;
-                write
-            }
-        });
-    }
-    if !writes.is_empty() {
-        // SAFETY: every write refers to live objects of the kinds the layout declares.
-        unsafe { device.push_descriptor.cmd_push_descriptor_set(commands, point, layout, 0, &writes) };
-    }
 }

@@ -74,6 +74,7 @@ impl Recorder<'_> {
             self.context.wait(value, &last_pass)?;
         }
         self.collect(&last_pass)?;
+        self.collect_hashes()?;
         Ok(std::mem::take(&mut self.staging))
     }
 

@@ -51,6 +51,9 @@ impl Method {
     }
 }
 
+/// No method: stands for whichever reaches the error of `--target-error` fastest.
+pub static AUTO: Method = Method::new::<path_tracing::Settings>("auto", &papers::KAJIYA_1986, "picked by pilot runs");
+
 /// Every method of the program, the default one first.
 pub const METHODS: &[Method] = &[
     Method::new::<explicit_visibility::Settings>(

@@ -8,6 +8,7 @@
 //! | [`bench_file`] | the file of `linklight bench` |
 //! | [`compare_page`] | the page of `linklight compare` and its data |
 //! | [`papers_page`] | the page of `linklight papers` and its data |
+//! | [`pass_hashes`] | the `--hashes` file, and where two of them part |
 //! | [`plot`] | log-log plots as SVG |
 //! | [`profile`] | the `--profile` JSON file |
 //! | [`trace`] | the `--trace` file for Perfetto and `chrome://tracing` |
@@ -24,6 +25,7 @@ mod exr_file;
 pub mod heat_map;
 pub mod image;
 pub mod papers_page;
+pub mod pass_hashes;
 pub mod plot;
 mod png_file;
 pub mod profile;
