@@ -292,7 +292,15 @@ impl Viewer {
     }
 
     fn keys(&mut self, ui: &Ui, desk: &Desk, step: f32) {
-        let pressed = |key| ui.ctx().input(|input| input.key_pressed(key));
+        // With the modifiers of the moment it was pressed: all may be released again within one slow frame.
+        let pressed_with = |wanted: Key, with_command: bool| {
+            let is_it = |event: &egui::Event| {
+                matches!(event, egui::Event::Key { key, pressed: true, modifiers, .. }
+                    if *key == wanted && modifiers.command == with_command)
+            };
+            ui.ctx().input(|input| input.events.iter().any(is_it))
+        };
+        let pressed = |key| pressed_with(key, false);
         let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
         if pressed(Key::F1) {
             self.is_bare = !self.is_bare;
@@ -315,11 +323,8 @@ impl Viewer {
         if pressed(Key::Space) {
             self.is_playing = !self.is_playing && duration > 0.0;
         }
-        if ui.ctx().input(|input| input.modifiers.command) {
-            self.wants_to_quit |= pressed(Key::Q);
-            self.wants_new_surface |= pressed(Key::L);
-            return;
-        }
+        self.wants_to_quit |= pressed_with(Key::Q, true);
+        self.wants_new_surface |= pressed_with(Key::L, true);
         for (key, other) in [(Key::PageDown, 1), (Key::PageUp, METHODS.len() - 1)] {
             if pressed(key) {
                 let at = METHODS.iter().position(|method| method.key == self.args.method.key).unwrap_or(0);
