@@ -45,8 +45,9 @@ pub enum Method {
 pub enum Solved<'a> {
     Elements(&'a dyn OnElements),
     Texels(&'a SurfaceShadowMaps),
-    /// On neither: pixels, clusters.
-    Other,
+    Clusters(&'a FaceClusters, face_cluster::Solution),
+    /// On no surface: pixels.
+    Pixels,
 }
 
 /// Face-cluster radiosity with the display stage that shows it.
@@ -188,7 +189,13 @@ impl Method {
                 Ok(Solved::Elements(&*shown.method))
             }
             Self::OnTexels(shown) => Ok(Solved::Texels(shown.solve(context, stage, request.bounces)?)),
-            Self::PathTracing(_) | Self::FaceClusters(_) => Ok(Solved::Other),
+            Self::FaceClusters(shown) => {
+                let solved = shown.method.solve(context, &cluster_stage(stage, None, watch), request.bounces);
+                solved.map_err(AppError::failed)?;
+                let solution = shown.method.keep(context).map_err(AppError::failed)?;
+                Ok(Solved::Clusters(&shown.method, solution))
+            }
+            Self::PathTracing(_) => Ok(Solved::Pixels),
         }
     }
 

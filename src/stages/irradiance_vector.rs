@@ -1,7 +1,10 @@
 //! A solution as vector irradiance per leaf element: what a method offers, and the display shades by.
 
-use crate::gpu::Buffer;
+use super::elements::Elements;
+use super::world::World;
+use crate::gpu::shaders::irradiance_vector as passes;
 use crate::gpu::shaders::types::{HalfVectors, LeafElement};
+use crate::gpu::{Buffer, Recorder};
 use glam::{UVec2, Vec3};
 
 /// What a method offers per leaf.
@@ -26,4 +29,33 @@ pub struct ElementLight<'a> {
     pub least_alpha: f32,
     /// Shade at vertices and interpolate.
     pub per_vertex: bool,
+}
+
+impl ElementLight<'_> {
+    /// What elements at the vertices receive by the leaves around them, into direct and indirect irradiance, W/m2.
+    pub fn at_elements(
+        &self,
+        recorder: &mut Recorder<'_>,
+        world: &World,
+        elements: &Elements,
+        [direct_irradiance, indirect_irradiance]: [&Buffer<Vec3>; 2],
+    ) {
+        let pass = passes::Elements {
+            element_vertices: &elements.vertices,
+            positions: &world.positions,
+            normals: &world.normals,
+            triangles: &world.triangles,
+            incident_offsets: &elements.incident_offsets,
+            incident_triangles: &elements.incident_triangles,
+            leaves: self.leaves,
+            triangle_leaves: self.triangle_leaves,
+            direct_vectors: self.direct,
+            indirect_vectors: self.indirect,
+            direct_irradiance,
+            indirect_irradiance,
+            params: passes::ElementsParams { element_count: elements.count, unit: self.unit },
+            constants: passes::ElementsConstants { irradiance_functions: self.functions },
+        };
+        recorder.dispatch(&pass, elements.count);
+    }
 }

@@ -10,6 +10,7 @@ mod deform;
 mod display;
 mod environment_irradiance;
 mod g_buffer;
+mod irradiance_vector;
 mod materials;
 mod pair_queue;
 mod punctual_irradiance;

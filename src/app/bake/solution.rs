@@ -11,9 +11,13 @@ use crate::gpu::Context;
 use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
 use crate::scene::atlas::{Atlas, NO_TEXEL};
 use crate::stages::elements::{ElementTopology, Elements};
+use crate::stages::irradiance_vector::ElementLight as LeafLight;
+use crate::stages::punctual;
 
 /// Rays start off their surface by so much of the scene's extent.
 const RAY_OFFSET: f32 = 1e-5;
+/// Shadow rays of a batch.
+const SHADOW_RAYS: usize = 1 << 19;
 
 /// What the elements at the vertices receive, reflect and emit. Element `v` is the front of vertex `v`.
 pub struct ElementLight {
@@ -45,10 +49,13 @@ impl ElementLight {
         match solved {
             Solved::Elements(method) => Ok((Self::of_elements(context, request, *method)?, None)),
             Solved::Texels(method) => Self::of_texels(context, request, stage, method),
-            Solved::Other => Err(AppError::Usage(format!(
-                "{} has no solution on surfaces to bake; use a method on elements or texels, such as explicit-visibility",
-                request.method.key
-            ))),
+            Solved::Clusters(method, solution) => {
+                let light = method.light(solution);
+                Ok((Self::of_clusters(context, request, stage, light)?, None))
+            }
+            Solved::Pixels => {
+                Err(AppError::Usage(format!("{} has no solution on surfaces to bake", request.method.key)))
+            }
         }
     }
 
@@ -57,6 +64,39 @@ impl ElementLight {
         let direct =
             sum(&[context.download(method.punctual_irradiance())?, context.download(method.direct_irradiance())?]);
         let indirect = context.download(method.indirect_irradiance())?;
+        Ok(Self {
+            irradiance: parts(request, &direct, &indirect),
+            whole_irradiance: sum(&[direct, indirect]),
+            albedo: context.download(&elements.albedo)?,
+            emission: context.download(&elements.emission)?,
+            back_elements: elements.topology.back_elements.clone(),
+        })
+    }
+
+    /// The vertices take what the leaves around them say, and shadow rays to punctual lights.
+    fn of_clusters(
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        light: LeafLight<'_>,
+    ) -> Result<Self, AppError> {
+        let topology = ElementTopology::new(&stage.scene, &stage.geometry, &stage.rest_positions);
+        let elements = Elements::new(context, topology, &stage.rest_positions, &stage.world, RAY_OFFSET)?;
+        let count = elements.count as usize;
+        let irradiance = |name: &str| context.buffer::<Vec3>(&format!("bake/{name}"), count);
+        let (direct, indirect, lights) = (irradiance("direct")?, irradiance("indirect")?, irradiance("lights")?);
+        let light_count = stage.world.light_count as usize;
+        let visibility = context.buffer("bake/visibility", (light_count * count).max(1))?;
+        let rays = context.buffer("bake/rays", SHADOW_RAYS)?;
+        let is_free = context.buffer("bake/is free", SHADOW_RAYS)?;
+        let mut recorder = context.recorder("bake")?;
+        light.at_elements(&mut recorder, &stage.world, &elements, [&direct, &indirect]);
+        let (tracer, world) = (stage.tracer(), &stage.world);
+        punctual::trace_visibility(&mut recorder, &tracer, world, &elements, &rays, &is_free, &visibility);
+        punctual::irradiance(&mut recorder, world, &elements, &visibility, &lights);
+        recorder.submit()?;
+        let direct = sum(&[context.download(&direct)?, context.download(&lights)?]);
+        let indirect = context.download(&indirect)?;
         Ok(Self {
             irradiance: parts(request, &direct, &indirect),
             whole_irradiance: sum(&[direct, indirect]),

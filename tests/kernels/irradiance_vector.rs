@@ -1,0 +1,138 @@
+//! `irradiance_vector/elements` against a plain sum over triangles.
+
+use crate::common::{Random, TestContext};
+use crate::compare::{Tolerance, hold, tells_apart};
+use glam::{Mat3, UVec2, UVec3, Vec2, Vec3};
+use linklight::gpu::Context;
+use linklight::gpu::shaders::irradiance_vector::{Elements, ElementsConstants, ElementsParams};
+use linklight::gpu::shaders::types::{HalfVectors, LeafElement};
+
+const BACK: u32 = 1 << 31;
+const NO_LEAF: u32 = u32::MAX;
+const FUNCTIONS: usize = 3;
+const UNIT: f32 = 0.25;
+/// Some tens of products; vectors are halves exactly.
+const TOLERANCE: Tolerance = Tolerance { absolute: 1e-5, relative: 1e-5 };
+
+/// Bits of a half float of a multiple of 1/8 below 16.
+fn half(value: f32) -> u32 {
+    if value == 0.0 {
+        return 0;
+    }
+    let bits = value.to_bits();
+    let exponent = (bits >> 23 & 0xff) as i32 - 127 + 15;
+    assert!((1..31).contains(&exponent) && bits & 0x1fff == 0, "{value} is no half");
+    (bits >> 31 << 15) | (exponent as u32) << 10 | (bits >> 13 & 0x3ff)
+}
+
+fn packed(m: &Mat3) -> HalfVectors {
+    let values = m.to_cols_array();
+    let word = |k: usize| half(values[2 * k]) | values.get(2 * k + 1).map_or(0, |value| half(*value)) << 16;
+    HalfVectors { words: [word(0), word(1), word(2), word(3), word(4)] }
+}
+
+/// Two triangles of a double-sided sheet, and one whose front alone has a leaf.
+struct Case {
+    entries: Vec<u32>,
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    triangles: Vec<UVec3>,
+    offsets: Vec<u32>,
+    incident: Vec<u32>,
+    leaves: Vec<LeafElement>,
+    triangle_leaves: Vec<UVec2>,
+    direct: Vec<Mat3>,
+    indirect: Vec<Mat3>,
+}
+
+impl Case {
+    fn new(random: &mut Random) -> Self {
+        let vector = |random: &mut Random| Vec3::new(random.unit(), random.unit(), random.unit()) * 2.0 - 1.0;
+        let leaf = |random: &mut Random| {
+            let axis_x = vector(random).normalize();
+            let axis_y = axis_x.any_orthonormal_vector();
+            LeafElement { center: vector(random), axis_x, axis_y, half_extent: Vec2::new(1.5, 0.75) }
+        };
+        let eighths = |random: &mut Random| Vec3::from([0; 3].map(|_| random.below(17) as f32 / 8.0 - 1.0));
+        let vectors = |random: &mut Random| Mat3::from_cols(eighths(random), eighths(random), eighths(random));
+        Self {
+            entries: vec![0, 1, 2, 3, 4, BACK, 1 | BACK, 4 | BACK],
+            positions: (0..5).map(|_| vector(random)).collect(),
+            normals: (0..5).map(|_| vector(random).normalize()).collect(),
+            triangles: vec![UVec3::new(0, 1, 2), UVec3::new(2, 1, 3), UVec3::new(3, 1, 4)],
+            offsets: vec![0, 1, 4, 6, 8, 9],
+            incident: vec![0, 0, 1, 2, 0, 1, 1, 2, 2],
+            leaves: (0..4).map(|_| leaf(random)).collect(),
+            triangle_leaves: vec![UVec2::new(0, 2), UVec2::new(1, 2), UVec2::new(3, NO_LEAF)],
+            direct: (0..4 * FUNCTIONS).map(|_| vectors(random)).collect(),
+            indirect: (0..4 * FUNCTIONS).map(|_| vectors(random)).collect(),
+        }
+    }
+
+    fn twin(&self, vectors: &[Mat3]) -> Vec<Vec3> {
+        let of_element = |&entry: &u32| {
+            let (vertex, is_back) = ((entry & !BACK) as usize, entry & BACK != 0);
+            let normal = if is_back { -self.normals[vertex] } else { self.normals[vertex] };
+            let (mut sum, mut area_sum) = (Vec3::ZERO, 0.0);
+            for &triangle in &self.incident[self.offsets[vertex] as usize..self.offsets[vertex + 1] as usize] {
+                let sides = self.triangle_leaves[triangle as usize];
+                let leaf = if is_back { sides.y } else { sides.x };
+                if leaf == NO_LEAF {
+                    continue;
+                }
+                let [a, b, c] = self.triangles[triangle as usize].to_array().map(|v| self.positions[v as usize]);
+                let area = (b - a).cross(c - a).length();
+                let shape = &self.leaves[leaf as usize];
+                let offset = self.positions[vertex] - shape.center;
+                let along = Vec2::new(offset.dot(shape.axis_x), offset.dot(shape.axis_y)) / shape.half_extent;
+                let s = along.clamp(Vec2::NEG_ONE, Vec2::ONE) * 3.0f32.sqrt();
+                let functions = &vectors[leaf as usize * FUNCTIONS..][..FUNCTIONS];
+                let light = UNIT * (functions[0] + s.x * functions[1] + s.y * functions[2]);
+                sum += area * (light.transpose() * normal).max(Vec3::ZERO);
+                area_sum += area;
+            }
+            if area_sum > 0.0 { sum / area_sum } else { Vec3::ZERO }
+        };
+        self.entries.iter().map(of_element).collect()
+    }
+
+    fn on_device(&self, context: &Context) -> [Vec<Vec3>; 2] {
+        let halves = |vectors: &[Mat3]| -> Vec<HalfVectors> { vectors.iter().map(packed).collect() };
+        let out = [(); 2].map(|()| context.buffer("test/irradiance", self.entries.len()).unwrap());
+        let pass = Elements {
+            element_vertices: &context.upload("test/entries", &self.entries).unwrap(),
+            positions: &context.upload("test/positions", &self.positions).unwrap(),
+            normals: &context.upload("test/normals", &self.normals).unwrap(),
+            triangles: &context.upload("test/triangles", &self.triangles).unwrap(),
+            incident_offsets: &context.upload("test/offsets", &self.offsets).unwrap(),
+            incident_triangles: &context.upload("test/incident", &self.incident).unwrap(),
+            leaves: &context.upload("test/leaves", &self.leaves).unwrap(),
+            triangle_leaves: &context.upload("test/triangle leaves", &self.triangle_leaves).unwrap(),
+            direct_vectors: &context.upload("test/direct", &halves(&self.direct)).unwrap(),
+            indirect_vectors: &context.upload("test/indirect", &halves(&self.indirect)).unwrap(),
+            direct_irradiance: &out[0],
+            indirect_irradiance: &out[1],
+            params: ElementsParams { element_count: self.entries.len() as u32, unit: UNIT },
+            constants: ElementsConstants { irradiance_functions: FUNCTIONS as u32 },
+        };
+        let mut recorder = context.recorder("test").unwrap();
+        recorder.dispatch(&pass, self.entries.len());
+        recorder.submit().unwrap();
+        out.map(|buffer| context.download(&buffer).unwrap())
+    }
+}
+
+#[test]
+fn irradiance_of_elements_agrees_with_its_twin() {
+    let context = TestContext::new();
+    let random = &mut Random(41);
+    for _ in 0..8 {
+        let case = Case::new(random);
+        let [direct, indirect] = case.on_device(&context);
+        let expected = case.twin(&case.direct);
+        hold("direct", &direct, &expected, TOLERANCE);
+        hold("indirect", &indirect, &case.twin(&case.indirect), TOLERANCE);
+        tells_apart("the other vectors", &case.twin(&case.indirect), &expected, TOLERANCE);
+    }
+    assert_eq!([1.0, -0.125, 8.0, 0.0].map(half), [0x3c00, 0xb000, 0x4800, 0]);
+}
