@@ -45,7 +45,7 @@ pub enum Method {
 pub enum Solved<'a> {
     Elements(&'a dyn OnElements),
     Texels(&'a SurfaceShadowMaps),
-    Clusters(&'a FaceClusters, face_cluster::Solution),
+    Clusters(&'a FaceClusters, Box<face_cluster::Solution>),
     /// On no surface: pixels.
     Pixels,
 }
@@ -193,7 +193,7 @@ impl Method {
                 let solved = shown.method.solve(context, &cluster_stage(stage, None, watch), request.bounces);
                 solved.map_err(AppError::failed)?;
                 let solution = shown.method.keep(context).map_err(AppError::failed)?;
-                Ok(Solved::Clusters(&shown.method, solution))
+                Ok(Solved::Clusters(&shown.method, Box::new(solution)))
             }
             Self::PathTracing(_) => Ok(Solved::Pixels),
         }

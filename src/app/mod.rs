@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`render`] | `linklight render`: a scene by a method into a picture |
 //! | [`bake`] | `linklight bake`: a solution into the scene |
-//! | [`mod@view`] | `linklight view`: a scene in a window |
+//! | `view` | `linklight view`: a scene in a window |
 //! | [`mod@bench`] | `linklight bench`: how long frames and passes take, with confidence |
 //! | [`compare`] | `linklight compare`: methods and settings beside the reference, as a page |
 //! | [`leak`] | `linklight leak`: light through closed walls, by method |
@@ -20,6 +20,7 @@
 pub mod bake;
 pub mod bench;
 pub mod cli;
+mod cli_evidence;
 pub mod compare;
 pub mod console;
 pub mod devices;

@@ -10,7 +10,7 @@
 //! |---|---|---|---|
 //! | face cluster | [`FaceCluster`](crate::gpu::shaders::types::FaceCluster) | – | [`Placement::clusters`] |
 //! | A_i, A_i^(n), D+, D- | area, `vector_area`, `facing` | m2 | of a cluster |
-//! | element i | [`FaceElement`] | – | [`State::elements`] |
+//! | element i | `FaceElement` | – | [`State::elements`] |
 //! | Phi_a | `basis`, [`Settings::irradiance_basis`], [`Settings::radiosity_basis`] | 1 | `lib/cluster_basis.glsl` |
 //! | m(x, y), K | made where needed | m^-2 | `transport` |
 //! | E_i,a | irradiance vector, a column a channel; direct and indirect | W/m2 | `face-cluster/direct`, `face-cluster/indirect`; of leaves, kept: [`Solution`] |

@@ -22,9 +22,8 @@
 //! scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
 //! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
 //! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
-//! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays (shared with the other
-//! methods); glossy elements send tables of directions along the links (`gloss`), which the paper leaves to the eye.
-//! What it does not do: mirrors sharper than a bin, and holes of alpha masks (leaves are opaque).
+//! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays; glossy elements send
+//! tables of directions along the links (`gloss`). Not done: mirrors sharper than a bin, holes of alpha masks.
 //!
 //! [Dong2007]: crate::methods::PAPERS
 
@@ -49,11 +48,9 @@ use crate::methods::explicit_visibility::Stage;
 use crate::scene::charts::{self, Charts};
 use crate::scene::environment::Environment;
 use crate::stages::elements::{ElementTopology, Elements};
-use crate::stages::emitters::Emitters;
-use crate::stages::punctual;
-use crate::stages::quadtree::Quadtrees;
-use crate::stages::quadtree::topology::QuadtreeTopology;
+use crate::stages::quadtree::{Quadtrees, topology::QuadtreeTopology};
 use crate::stages::world::{World, WorldEnvironment};
+use crate::stages::{emitters::Emitters, punctual};
 use glam::Vec3;
 use gloss::Gloss;
 use linking::Sizes;

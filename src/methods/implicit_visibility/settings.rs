@@ -51,8 +51,8 @@ crate::settings! {
         transport: Transport = Transport::Coverage, paper "disc";
         /// How the bins of leaves are turned.
         frames: Frames = Frames::World, paper "world";
-        /// Turn all bins by this much. Another angle each frame trades bands for noise; averaging such frames does not calm
-        /// what flickers around things that move, since links from above are turned by whole bins.
+        /// Turn all bins by this much. Another angle each frame trades bands for noise; averaging such frames was not found
+        /// to calm what flickers around things that move.
         spin: f32 = 0.0, range -360.0..=360.0, unit "degrees", paper "0";
         /// How light of emissive surfaces reaches the elements directly.
         emitters: EmitterChoice = EmitterChoice::Auto, paper "along links";
