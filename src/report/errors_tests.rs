@@ -1,4 +1,4 @@
-//! The figures against values worked out by hand. `tests/harness.rs` shows that each reports a wrong picture.
+//! The figures against values worked out by hand and by other programs. `tests/harness.rs` shows that each reports a wrong picture.
 
 use super::*;
 use crate::report::tonemap::srgb_decode;
@@ -27,6 +27,35 @@ fn figures_match_their_definitions() {
     close(found.relative_mse.unwrap(), 0.25 / 1.04 / 2.0);
     close(found.mean_ratio.unwrap(), 4.5 / 4.0);
     close(found.relative_error_p95.unwrap(), (0.25f64 / 1.04).sqrt());
+}
+
+/// Values by NumPy 2.4, SciPy 1.17 and flip-evaluator 1.7 (NVIDIA's own): `tools/figures/error_figures.py` prints them.
+#[test]
+fn figures_agree_with_other_programs() {
+    let base = |x: u32, y: u32| ((x * 7 + y * 13) % 17) as f32 / 8.0 + 0.25;
+    let shade = |value: f32| value * Vec3::new(1.0, 0.5, 0.25);
+    let reference = picture(48, 32, |x, y| shade(base(x, y)));
+    let changed = picture(48, 32, |x, y| {
+        let factor = 1.0 + (((x * 5 + y * 3) % 11) as f32 - 5.0) / 32.0;
+        shade(base(x, y)) * factor
+    });
+    let found = figures(&changed, &reference);
+    close(found.rmse, 0.090_955_670_983_931_65);
+    close(found.relative_mse.unwrap(), 0.009_205_767_569_752_407);
+    close(found.mean_ratio.unwrap(), 0.999_733_288_813_603_6);
+    close(found.relative_error_p95.unwrap(), 0.155_319_973_170_175_46);
+    close(found.ssim, 0.975_714_283_153_203_1);
+
+    let of_bytes = |bytes: [u32; 3]| Vec3::from(bytes.map(|byte| srgb_decode(byte as f32 / 255.0)));
+    let display = |value: &dyn Fn(u32, u32, u32) -> u32| Picture {
+        encoding: Encoding::Display,
+        ..picture(48, 32, |x, y| of_bytes([0, 1, 2].map(|channel| value(x, y, channel) % 256)))
+    };
+    let shown = |x: u32, y: u32, channel: u32| (x * 5 + y * 3 + channel * 53) % 256;
+    let other = |x: u32, y: u32, channel: u32| shown(x, y, channel) + (x * 11 + y * 7 + channel * 29) % 41;
+    let found = figures(&display(&other), &display(&shown));
+    assert!((found.flip_mean - 0.579_260_77).abs() < 1e-3, "{}", found.flip_mean);
+    assert!((found.flip_p95 - 0.972_218_4).abs() < 1e-3, "{}", found.flip_p95);
 }
 
 #[test]
