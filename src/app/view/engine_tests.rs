@@ -9,7 +9,8 @@ use crate::app::values::{Format, Output};
 use crate::gpu::Options;
 use crate::stages::work::Unwatched;
 
-const PICTURE: &str = "--size 30x20 --elements 400 --bounces 1 --spp 1";
+/// Where a test says nothing else.
+const PICTURE: [(&str, &str); 4] = [("--size", "30x20"), ("--elements", "400"), ("--bounces", "1"), ("--spp", "1")];
 
 fn context() -> Context {
     Context::new(Options { validation: true, ..Options::default() }).unwrap()
@@ -17,7 +18,9 @@ fn context() -> Context {
 
 fn request(options: &str) -> RenderRequest {
     let scene = if options.contains("builtin:") { "" } else { "builtin:office" };
-    let line = format!("linklight view {scene} {PICTURE} {options}");
+    let unsaid = PICTURE.iter().filter(|(name, _)| !options.contains(name));
+    let unsaid: String = unsaid.map(|(name, value)| format!("{name} {value} ")).collect();
+    let line = format!("linklight view {scene} {unsaid} {options}");
     let Command::View(args) = Cli::try_parse_from(line.split_whitespace()).unwrap().command else { panic!("no view") };
     RenderRequest::of_picture(&args.picture, Output { path: "a.png".into(), format: Format::Png }).unwrap()
 }
