@@ -3,6 +3,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::UVec2;
+use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::irradiance_vector;
 use linklight::display::shadow_maps::ShadowMaps;
@@ -79,7 +80,9 @@ fn row(context: &Context, triangles: u32) -> Row {
         context.take_records();
         let mut recorder = context.recorder("frame").unwrap();
         let light = method.light(&solution);
-        irradiance_vector::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, &view, 1, &film);
+        let (world, shadow_maps, g_buffer, view, film) = (&world, &shadow_maps, &g_buffer, &view, &film);
+        let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: 1, film };
+        irradiance_vector::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         let records = context.take_records();
         let ms = |is_own: &dyn Fn(&str) -> bool| -> f64 {

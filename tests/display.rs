@@ -5,6 +5,7 @@ mod common;
 use common::TestContext;
 use common::scenes::{lambert, light, parallelogram, scene};
 use glam::{UVec2, Vec2, Vec3};
+use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::vertex::{self, VertexLight};
@@ -58,7 +59,8 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
     };
     let mut recorder = context.recorder("frame").unwrap();
     shadow_maps.draw(&mut recorder, &world, &pose, bounds);
-    vertex::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, view, samples, &film);
+    let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
+    vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples, film });
     recorder.submit().unwrap();
     Shown {
         direct: context.download(&film.direct).unwrap(),

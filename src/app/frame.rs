@@ -6,7 +6,7 @@ use super::on_elements::OnElements;
 use super::on_texels::TexelsShown;
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
-use crate::display::direct::Sample;
+use crate::display::direct::{Canvas, Sample};
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::irradiance_vector;
@@ -292,12 +292,12 @@ impl Method {
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     // False colours are those of vertices.
+                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
                     match (splat_sums, method.splats(), light.colors) {
                         (Some(sums), Some(splats), None) => {
-                            let light = SplatLight { vertices: light, splats, sums };
-                            splat::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                            splat::draw(recorder, SplatLight { vertices: light, splats, sums }, canvas);
                         }
-                        _ => vertex::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film),
+                        _ => vertex::draw(recorder, light, canvas),
                     }
                 });
                 recorder.submit()?;
@@ -326,7 +326,8 @@ impl Method {
                 recorder.scope("display", |recorder| {
                     let light = method.light(&solution);
                     shadow_maps.draw(recorder, world, pose, *bounds);
-                    irradiance_vector::draw(recorder, world, light, shadow_maps, g_buffer, view, request.spp, film);
+                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
+                    irradiance_vector::draw(recorder, light, canvas);
                 });
                 recorder.submit()?;
                 partial.map_or(Ok(()), Err)

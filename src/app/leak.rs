@@ -14,13 +14,12 @@ use serde::Serialize;
 
 use super::cli::{Global, LeakArgs, WallSides};
 use super::compare::measured::mean;
-use super::compare::plan::{Plan, Run};
+use super::compare::plan::{Plan, Run, methods_or_all};
 use super::console::{Console, Watcher};
 use super::interrupt::Interrupt;
 use super::stage::Stage;
 use super::values::SceneSource;
 use super::{AppError, frame, measure, render};
-use crate::methods::{METHODS, Method};
 use crate::report::profile::Device;
 use crate::report::trace::TimeLine;
 use crate::report::write::{check_writable, write_text};
@@ -58,8 +57,7 @@ pub fn run(
     out: &mut dyn Write,
 ) -> Result<(), AppError> {
     args.output.as_deref().map(check_writable).transpose()?;
-    let methods: Vec<&'static Method> =
-        if args.method.is_empty() { METHODS.iter().collect() } else { args.method.clone() };
+    let methods = methods_or_all(&args.method);
     let plan = Plan { methods: methods.clone(), variations: &[], set: &args.set, options: &args.options, global };
     plan.check()?;
     let mut work = Vec::new();

@@ -46,6 +46,37 @@ pub trait OnElements {
     }
 }
 
+/// What every method offers under the same names.
+macro_rules! as_it_is {
+    () => {
+        fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
+            let mut recorder = context.recorder("relight")?;
+            self.update_materials(&mut recorder, world);
+            Ok(recorder.submit()?)
+        }
+
+        fn elements(&self) -> &Elements {
+            Self::elements(self)
+        }
+
+        fn facts(&self) -> serde_json::Result<Value> {
+            serde_json::to_value(self.report())
+        }
+
+        fn punctual_irradiance(&self) -> &Buffer<Vec3> {
+            Self::punctual_irradiance(self)
+        }
+
+        fn direct_irradiance(&self) -> &Buffer<Vec3> {
+            Self::direct_irradiance(self)
+        }
+
+        fn indirect_irradiance(&self) -> &Buffer<Vec3> {
+            Self::indirect_irradiance(self)
+        }
+    };
+}
+
 impl OnElements for ExplicitVisibility {
     fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
         let mut recorder = context.recorder("frame")?;
@@ -53,31 +84,7 @@ impl OnElements for ExplicitVisibility {
         Ok(recorder.submit()?)
     }
 
-    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
-        let mut recorder = context.recorder("relight")?;
-        self.update_materials(&mut recorder, world);
-        Ok(recorder.submit()?)
-    }
-
-    fn elements(&self) -> &Elements {
-        Self::elements(self)
-    }
-
-    fn facts(&self) -> serde_json::Result<Value> {
-        serde_json::to_value(self.report())
-    }
-
-    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
-        Self::punctual_irradiance(self)
-    }
-
-    fn direct_irradiance(&self) -> &Buffer<Vec3> {
-        Self::direct_irradiance(self)
-    }
-
-    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
-        Self::indirect_irradiance(self)
-    }
+    as_it_is!();
 }
 
 impl OnElements for ImplicitVisibility {
@@ -89,31 +96,7 @@ impl OnElements for ImplicitVisibility {
         Ok(recorder.submit()?)
     }
 
-    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
-        let mut recorder = context.recorder("relight")?;
-        self.update_materials(&mut recorder, world);
-        Ok(recorder.submit()?)
-    }
-
-    fn elements(&self) -> &Elements {
-        Self::elements(self)
-    }
-
-    fn facts(&self) -> serde_json::Result<Value> {
-        serde_json::to_value(self.report())
-    }
-
-    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
-        Self::punctual_irradiance(self)
-    }
-
-    fn direct_irradiance(&self) -> &Buffer<Vec3> {
-        Self::direct_irradiance(self)
-    }
-
-    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
-        Self::indirect_irradiance(self)
-    }
+    as_it_is!();
 
     fn look(&self, context: &Context, world: &World, view: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
         let mut recorder = context.recorder("frame")?;
@@ -150,31 +133,7 @@ impl OnElements for Antiradiance {
         Ok(())
     }
 
-    fn relight(&self, context: &Context, world: &World) -> Result<(), AppError> {
-        let mut recorder = context.recorder("relight")?;
-        self.update_materials(&mut recorder, world);
-        Ok(recorder.submit()?)
-    }
-
-    fn elements(&self) -> &Elements {
-        Self::elements(self)
-    }
-
-    fn facts(&self) -> serde_json::Result<Value> {
-        serde_json::to_value(self.report())
-    }
-
-    fn punctual_irradiance(&self) -> &Buffer<Vec3> {
-        Self::punctual_irradiance(self)
-    }
-
-    fn direct_irradiance(&self) -> &Buffer<Vec3> {
-        Self::direct_irradiance(self)
-    }
-
-    fn indirect_irradiance(&self) -> &Buffer<Vec3> {
-        Self::indirect_irradiance(self)
-    }
+    as_it_is!();
 
     fn look(&self, context: &Context, world: &World, view: &View) -> Result<(&Buffer<Vec3>, &Buffer<Vec3>), AppError> {
         let mut recorder = context.recorder("frame")?;

@@ -5,6 +5,7 @@ use super::cli::Display;
 use super::frame::{check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
+use crate::display::direct::Canvas;
 use crate::display::final_gather::{FinalGather, Gathered};
 use crate::display::g_buffer::GBuffer;
 use crate::display::lightmap::{self, Lightmap, TexelLight};
@@ -138,8 +139,9 @@ impl TexelsShown {
                 };
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
-                    let (shadow_maps, g_buffer) = (&self.shadow_maps, &self.g_buffer);
-                    display.draw(recorder, world, light, shadow_maps, g_buffer, &stage.view, request.spp, film);
+                    let (shadow_maps, g_buffer, view) = (&self.shadow_maps, &self.g_buffer, &stage.view);
+                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
+                    display.draw(recorder, light, canvas);
                 });
                 Ok(recorder.submit()?)
             }

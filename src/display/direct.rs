@@ -1,12 +1,48 @@
 //! What every display stage starts from: the G-buffer, background, emission, and punctual light by shadow maps.
 
-use super::PixelView;
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
+use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display::{Direct, DirectParams};
 use crate::gpu::{Recorder, Sampled};
+use crate::scene::camera::View;
 use crate::stages::film::Film;
 use crate::stages::world::World;
+use glam::UVec2;
+
+/// What a display stage draws with, and into.
+#[derive(Clone, Copy)]
+pub struct Canvas<'a> {
+    pub world: &'a World,
+    pub shadow_maps: &'a ShadowMaps,
+    pub g_buffer: &'a GBuffer,
+    pub view: &'a View,
+    /// Places within each pixel, at least 1.
+    pub samples: u32,
+    pub film: &'a Film,
+}
+
+impl Canvas<'_> {
+    /// Fills the film with the mean of all samples, each shifted within the pixel: direct light, then what `add` draws of
+    /// one sample, which counts by the weight it is given. Without light (`is_unlit`) surfaces start black.
+    pub fn draw(
+        &self,
+        recorder: &mut Recorder<'_>,
+        is_unlit: bool,
+        mut add: impl FnMut(&mut Recorder<'_>, &PixelView, f32),
+    ) {
+        let Self { world, shadow_maps, g_buffer, view, samples, film } = *self;
+        let size = UVec2::new(film.width, film.height);
+        for index in 0..samples {
+            let pixel_view = PixelView::new(view, size, sample_offset(index, samples));
+            recorder.scope("sample", |recorder| {
+                let sample = Sample { index, samples, is_unlit };
+                draw(recorder, world, shadow_maps, g_buffer, &pixel_view, sample, film);
+                add(recorder, &pixel_view, 1.0 / samples as f32);
+            });
+        }
+    }
+}
 
 /// One of the pictures whose mean the film holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,19 +3,13 @@
 //! The filter is the uniform cubic B-spline over the texels of the chart that is seen; texels of other charts and empty
 //! ones are left out, so that nothing bleeds in over the border.
 
-use super::direct::{self, Sample};
-use super::g_buffer::GBuffer;
-use super::shadow_maps::ShadowMaps;
-use super::{PixelView, sample_offset};
+use super::direct::Canvas;
 use crate::gpu::shaders::display::{Lightmap as Pass, LightmapParams};
 use crate::gpu::shaders::types::TriangleCorners;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::report::image::{Picture, PictureError};
 use crate::scene::atlas::{Atlas, NO_TEXEL};
-use crate::scene::camera::View;
-use crate::stages::film::Film;
-use crate::stages::world::World;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
 /// Where things lie in the atlas.
 pub struct Lightmap {
@@ -49,51 +43,35 @@ impl Lightmap {
         })
     }
 
-    /// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
-    #[expect(clippy::too_many_arguments, reason = "everything a picture is made of, each by its own type")]
-    pub fn draw(
-        &self,
-        recorder: &mut Recorder<'_>,
-        world: &World,
-        light: TexelLight<'_>,
-        shadow_maps: &ShadowMaps,
-        g_buffer: &GBuffer,
-        view: &View,
-        samples: u32,
-        film: &Film,
-    ) {
-        let size = UVec2::new(film.width, film.height);
-        for index in 0..samples {
-            let pixel_view = PixelView::new(view, size, sample_offset(index, samples));
-            recorder.scope("sample", |recorder| {
-                let sample = Sample { index, samples, is_unlit: false };
-                direct::draw(recorder, world, shadow_maps, g_buffer, &pixel_view, sample, film);
-                let pass = Pass {
-                    visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-                    g_position: g_buffer.sampled(&g_buffer.position),
-                    g_normal: g_buffer.sampled(&g_buffer.normal),
-                    g_albedo: g_buffer.sampled(&g_buffer.albedo),
-                    g_specular: g_buffer.sampled(&g_buffer.specular),
-                    g_emission: g_buffer.sampled(&g_buffer.emission),
-                    triangles: &world.triangles,
-                    positions: &world.positions,
-                    corner_places: &self.corner_places,
-                    texel_at: &self.texel_at,
-                    texel_charts: &self.texel_charts,
-                    direct_irradiance: light.direct_irradiance,
-                    indirect_irradiance: light.indirect_irradiance,
-                    direct: &film.direct,
-                    indirect: &film.indirect,
-                    params: LightmapParams {
-                        eye: pixel_view.eye,
-                        weight: 1.0 / samples as f32,
-                        resolution: self.resolution,
-                        triangle_count: self.triangle_count,
-                    },
-                };
-                recorder.dispatch(&pass, [film.width, film.height]);
-            });
-        }
+    /// Fills the canvas' film.
+    pub fn draw(&self, recorder: &mut Recorder<'_>, light: TexelLight<'_>, canvas: Canvas<'_>) {
+        let Canvas { world, g_buffer, film, .. } = canvas;
+        canvas.draw(recorder, false, |recorder, pixel_view, weight| {
+            let pass = Pass {
+                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+                g_position: g_buffer.sampled(&g_buffer.position),
+                g_normal: g_buffer.sampled(&g_buffer.normal),
+                g_albedo: g_buffer.sampled(&g_buffer.albedo),
+                g_specular: g_buffer.sampled(&g_buffer.specular),
+                g_emission: g_buffer.sampled(&g_buffer.emission),
+                triangles: &world.triangles,
+                positions: &world.positions,
+                corner_places: &self.corner_places,
+                texel_at: &self.texel_at,
+                texel_charts: &self.texel_charts,
+                direct_irradiance: light.direct_irradiance,
+                indirect_irradiance: light.indirect_irradiance,
+                direct: &film.direct,
+                indirect: &film.indirect,
+                params: LightmapParams {
+                    eye: pixel_view.eye,
+                    weight,
+                    resolution: self.resolution,
+                    triangle_count: self.triangle_count,
+                },
+            };
+            recorder.dispatch(&pass, [film.width, film.height]);
+        });
     }
 }
 

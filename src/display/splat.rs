@@ -6,20 +6,13 @@
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
-use super::direct::{self, Sample};
-use super::g_buffer::GBuffer;
-use super::shadow_maps::ShadowMaps;
+use super::direct::Canvas;
 use super::vertex::VertexLight;
-use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display::{Splat, SplatNormalize, SplatNormalizeParams, SplatParams};
 use crate::gpu::{
     Blend, Context, Format, GpuError, Image, ImageDescription, Load, RasterState, Recorder, Shape, Target,
 };
-use crate::scene::camera::View;
-use crate::stages::film::Film;
 use crate::stages::splats::Splats;
-use crate::stages::world::World;
-use glam::UVec2;
 
 /// Corners of the two triangles of a splat: `SPLAT_CORNERS` of `lib/splat.glsl`.
 const CORNERS: u32 = 6;
@@ -48,60 +41,42 @@ pub struct SplatLight<'a> {
     pub sums: &'a SplatSums,
 }
 
-/// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
-#[expect(clippy::too_many_arguments, reason = "everything a picture is made of, each by its own type")]
-pub fn draw(
-    recorder: &mut Recorder<'_>,
-    world: &World,
-    light: SplatLight<'_>,
-    shadow_maps: &ShadowMaps,
-    g_buffer: &GBuffer,
-    view: &View,
-    samples: u32,
-    film: &Film,
-) {
-    let size = UVec2::new(film.width, film.height);
+/// Fills the canvas' film.
+pub fn draw(recorder: &mut Recorder<'_>, light: SplatLight<'_>, canvas: Canvas<'_>) {
+    let Canvas { world, g_buffer, film, .. } = canvas;
     let SplatLight { vertices, splats, sums } = light;
-    for sample in 0..samples {
-        let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
-        recorder.scope("sample", |recorder| {
-            let sample = Sample { index: sample, samples, is_unlit: false };
-            direct::draw(recorder, world, shadow_maps, g_buffer, &pixel_view, sample, film);
-            let splat = Splat {
-                splats: &splats.splats,
-                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-                g_position: g_buffer.sampled(&g_buffer.position),
-                triangle_surfaces: &splats.triangle_surfaces,
-                direct_irradiance: vertices.direct_irradiance,
-                indirect_irradiance: vertices.indirect_irradiance,
-                params: SplatParams {
-                    clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(),
-                    eye: pixel_view.eye,
-                },
-            };
-            let clear = Load::Clear([0.0; 4]);
-            let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
-            let state = RasterState { blend: Blend::Add, ..RasterState::default() };
-            recorder.draw(&splat, &target, state, CORNERS, splats.count);
-            let normalize = SplatNormalize {
-                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-                g_position: g_buffer.sampled(&g_buffer.position),
-                g_normal: g_buffer.sampled(&g_buffer.normal),
-                g_albedo: g_buffer.sampled(&g_buffer.albedo),
-                g_specular: g_buffer.sampled(&g_buffer.specular),
-                g_emission: g_buffer.sampled(&g_buffer.emission),
-                triangles: &world.triangles,
-                positions: &world.positions,
-                direct_irradiance: vertices.direct_irradiance,
-                indirect_irradiance: vertices.indirect_irradiance,
-                back_elements: vertices.back_elements,
-                direct: &film.direct,
-                indirect: &film.indirect,
-                direct_splats: g_buffer.sampled(&sums.direct),
-                indirect_splats: g_buffer.sampled(&sums.indirect),
-                params: SplatNormalizeParams { eye: pixel_view.eye, weight: 1.0 / samples as f32 },
-            };
-            recorder.dispatch(&normalize, [film.width, film.height]);
-        });
-    }
+    canvas.draw(recorder, false, |recorder, pixel_view, weight| {
+        let splat = Splat {
+            splats: &splats.splats,
+            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+            g_position: g_buffer.sampled(&g_buffer.position),
+            triangle_surfaces: &splats.triangle_surfaces,
+            direct_irradiance: vertices.direct_irradiance,
+            indirect_irradiance: vertices.indirect_irradiance,
+            params: SplatParams { clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(), eye: pixel_view.eye },
+        };
+        let clear = Load::Clear([0.0; 4]);
+        let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
+        let state = RasterState { blend: Blend::Add, ..RasterState::default() };
+        recorder.draw(&splat, &target, state, CORNERS, splats.count);
+        let normalize = SplatNormalize {
+            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+            g_position: g_buffer.sampled(&g_buffer.position),
+            g_normal: g_buffer.sampled(&g_buffer.normal),
+            g_albedo: g_buffer.sampled(&g_buffer.albedo),
+            g_specular: g_buffer.sampled(&g_buffer.specular),
+            g_emission: g_buffer.sampled(&g_buffer.emission),
+            triangles: &world.triangles,
+            positions: &world.positions,
+            direct_irradiance: vertices.direct_irradiance,
+            indirect_irradiance: vertices.indirect_irradiance,
+            back_elements: vertices.back_elements,
+            direct: &film.direct,
+            indirect: &film.indirect,
+            direct_splats: g_buffer.sampled(&sums.direct),
+            indirect_splats: g_buffer.sampled(&sums.indirect),
+            params: SplatNormalizeParams { eye: pixel_view.eye, weight },
+        };
+        recorder.dispatch(&normalize, [film.width, film.height]);
+    });
 }

@@ -1,15 +1,9 @@
 //! Vertex display: punctual light per pixel by shadow maps, all other light interpolated between vertices.
 
-use super::direct::{self, Sample};
-use super::g_buffer::GBuffer;
-use super::shadow_maps::ShadowMaps;
-use super::{PixelView, sample_offset};
+use super::direct::Canvas;
 use crate::gpu::shaders::display::{Vertex, VertexParams};
 use crate::gpu::{Buffer, Recorder};
-use crate::scene::camera::View;
-use crate::stages::film::Film;
-use crate::stages::world::World;
-use glam::{UVec2, Vec3};
+use glam::Vec3;
 
 /// What a method offers per element, W/m2. Element `v` is the front of vertex `v`.
 #[derive(Clone, Copy)]
@@ -24,52 +18,26 @@ pub struct VertexLight<'a> {
     pub colors: Option<&'a Buffer<Vec3>>,
 }
 
-/// Fills `film` with the mean of `samples` pictures, each shifted within the pixel.
-#[expect(clippy::too_many_arguments, reason = "everything a picture is made of, each by its own type")]
-pub fn draw(
-    recorder: &mut Recorder<'_>,
-    world: &World,
-    light: VertexLight<'_>,
-    shadow_maps: &ShadowMaps,
-    g_buffer: &GBuffer,
-    view: &View,
-    samples: u32,
-    film: &Film,
-) {
-    let size = UVec2::new(film.width, film.height);
-    for sample in 0..samples {
-        let pixel_view = PixelView::new(view, size, sample_offset(sample, samples));
-        recorder.scope("sample", |recorder| {
-            direct::draw(
-                recorder,
-                world,
-                shadow_maps,
-                g_buffer,
-                &pixel_view,
-                Sample { index: sample, samples, is_unlit: light.colors.is_some() },
-                film,
-            );
-            let pass = Vertex {
-                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-                g_position: g_buffer.sampled(&g_buffer.position),
-                g_normal: g_buffer.sampled(&g_buffer.normal),
-                g_albedo: g_buffer.sampled(&g_buffer.albedo),
-                g_specular: g_buffer.sampled(&g_buffer.specular),
-                g_emission: g_buffer.sampled(&g_buffer.emission),
-                triangles: &world.triangles,
-                positions: &world.positions,
-                direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
-                indirect_irradiance: light.indirect_irradiance,
-                back_elements: light.back_elements,
-                direct: &film.direct,
-                indirect: &film.indirect,
-                params: VertexParams {
-                    eye: pixel_view.eye,
-                    weight: 1.0 / samples as f32,
-                    shows_colors: u32::from(light.colors.is_some()),
-                },
-            };
-            recorder.dispatch(&pass, [film.width, film.height]);
-        });
-    }
+/// Fills the canvas' film.
+pub fn draw(recorder: &mut Recorder<'_>, light: VertexLight<'_>, canvas: Canvas<'_>) {
+    let Canvas { world, g_buffer, film, .. } = canvas;
+    canvas.draw(recorder, light.colors.is_some(), |recorder, pixel_view, weight| {
+        let pass = Vertex {
+            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+            g_position: g_buffer.sampled(&g_buffer.position),
+            g_normal: g_buffer.sampled(&g_buffer.normal),
+            g_albedo: g_buffer.sampled(&g_buffer.albedo),
+            g_specular: g_buffer.sampled(&g_buffer.specular),
+            g_emission: g_buffer.sampled(&g_buffer.emission),
+            triangles: &world.triangles,
+            positions: &world.positions,
+            direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
+            indirect_irradiance: light.indirect_irradiance,
+            back_elements: light.back_elements,
+            direct: &film.direct,
+            indirect: &film.indirect,
+            params: VertexParams { eye: pixel_view.eye, weight, shows_colors: u32::from(light.colors.is_some()) },
+        };
+        recorder.dispatch(&pass, [film.width, film.height]);
+    });
 }

@@ -5,6 +5,7 @@ use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::fixture::Fixture;
 use crate::support::{prepare, settings};
 use glam::{UVec2, Vec2, Vec3};
+use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::splat::{self, SplatLight, SplatSums};
@@ -42,7 +43,9 @@ fn splats_reproduce_even_and_linear_light() {
             colors: None,
         };
         let light = SplatLight { vertices, splats: method.splats(), sums: &sums };
-        splat::draw(&mut recorder, &fixture.world, light, &shadow_maps, &g_buffer, &view, 1, &film);
+        let (world, shadow_maps, g_buffer) = (&fixture.world, &shadow_maps, &g_buffer);
+        let canvas = Canvas { world, shadow_maps, g_buffer, view: &view, samples: 1, film: &film };
+        splat::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         context.download(&film.indirect).unwrap()
     };

@@ -7,6 +7,7 @@ use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
 use glam::{UVec2, Vec2, Vec3, Vec4};
+use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::vertex::{self, VertexLight};
@@ -221,7 +222,8 @@ impl Case {
         let light = VertexLight { direct_irradiance, indirect_irradiance, back_elements, colors: None };
         let mut recorder = context.recorder("test").unwrap();
         shadow_maps.draw(&mut recorder, &world, pose, bounds);
-        vertex::draw(&mut recorder, &world, light, &shadow_maps, &g_buffer, view, samples, &film);
+        let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
+        vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples, film });
         recorder.submit().unwrap();
         let got = Pictures {
             direct: context.download(&film.direct).unwrap(),
@@ -244,9 +246,9 @@ impl Case {
         for sample in 0..samples {
             let offset = sample_offset(sample, samples);
             let mut recorder = context.recorder("test").unwrap();
-            g_buffer.draw(&mut recorder, &world, &PixelView::new(view, SIZE, offset));
+            g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, offset));
             recorder.submit().unwrap();
-            self.vertex(&Surfaces::of(context, &g_buffer), offset, 1.0 / samples as f32, &mut expected);
+            self.vertex(&Surfaces::of(context, g_buffer), offset, 1.0 / samples as f32, &mut expected);
         }
         (got, expected)
     }

@@ -10,10 +10,9 @@ use std::time::Instant;
 
 use super::AppError;
 use super::cli::{BenchArgs, Global};
-use super::compare::plan::{Plan, Run};
+use super::compare::plan::{Plan, Run, methods_or_all};
 use super::console::{Console, Watcher};
 use super::interrupt::Interrupt;
-use crate::methods::METHODS;
 use crate::report::bench_file::{BenchFile, Comparison, SCHEMA, VERSION, WarmUp};
 use crate::report::statistics::{Verdict, median, paired};
 use crate::report::write::check_writable;
@@ -58,10 +57,7 @@ pub fn run(
 
 /// Every scene by every method and variation; the first one is what the others are held against.
 fn runs(args: &BenchArgs, global: &Global) -> Result<Vec<Run>, AppError> {
-    let methods = match args.method.as_slice() {
-        [] => METHODS.iter().collect(),
-        chosen => chosen.to_vec(),
-    };
+    let methods = methods_or_all(&args.method);
     let plan = Plan { methods, variations: &args.vary, set: &args.set, options: &args.options, global };
     plan.check()?;
     let folder = std::env::temp_dir();

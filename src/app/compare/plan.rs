@@ -52,6 +52,11 @@ pub struct Run {
     pub global: Global,
 }
 
+/// The methods that were asked for, or all.
+pub fn methods_or_all(chosen: &[&'static Method]) -> Vec<&'static Method> {
+    if chosen.is_empty() { METHODS.iter().collect() } else { chosen.to_vec() }
+}
+
 /// What all runs share.
 pub struct Plan<'a> {
     pub methods: Vec<&'static Method>,
