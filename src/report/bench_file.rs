@@ -93,7 +93,10 @@ pub struct PassTimes {
     pub times: Times,
     /// By the algorithm, in a frame.
     pub bytes: u64,
-    /// Of the bandwidth that the copy reached in the same rounds.
+    /// Of the bandwidth that the copy reached in the same rounds. The roofline's other side, arithmetic, has no share here:
+    /// no Vulkan query counts a pass's operations, and counting instructions in its shader would guess at its loops and
+    /// branches. A pass with a small share is bound by arithmetic, latency or dispatches; `yardsticks` holds the rates of
+    /// the first and the last.
     pub bandwidth_share: f64,
 }
 

@@ -38,7 +38,23 @@ pub struct RowReport {
     pub says: &'static str,
     pub unit: &'static str,
     pub outcome: Outcome,
+    pub pictures: Vec<Picture>,
     pub commands: Vec<Command>,
+}
+
+/// A picture of a row's runs, or of the reference they are held to.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Picture {
+    pub caption: String,
+    /// Relative to the page.
+    pub png: String,
+}
+
+impl Picture {
+    /// The path-traced one.
+    pub fn reference(png: String) -> Self {
+        Self { caption: "path tracing".into(), png }
+    }
 }
 
 /// A command whose runs were measured.
@@ -61,6 +77,8 @@ pub enum Outcome {
         expected: String,
         verdict: Verdict,
     },
+    /// It is a figure of pictures, which stand on the page.
+    Shown,
     /// Why it is not measured.
     Not(String),
     /// What went wrong.
@@ -105,6 +123,7 @@ impl Outcome {
     fn verdict(&self) -> &'static str {
         match self {
             Self::Number { verdict, .. } | Self::Trend { verdict, .. } => verdict.in_words(),
+            Self::Shown => "shown",
             Self::Not(_) => "not measured",
             Self::Failed(_) => "failed",
         }
@@ -118,6 +137,7 @@ impl Outcome {
                     values.iter().map(|value| format!("{}: {}", value.caption, number(value.value))).collect();
                 format!("{} ({unit})", values.join(", "))
             }
+            Self::Shown => "pictures".into(),
             Self::Not(why) | Self::Failed(why) => why.clone(),
         }
     }
@@ -209,8 +229,24 @@ pub fn to_html(report: &Report) -> String {
             let _ = writeln!(html, "<tr class=\"{class}\">{cells}<td><b>{verdict}</b>{commands}</td></tr>");
         }
         html += "</tbody></table></div>\n";
+        let rows = report.rows.iter().filter(|row| row.paper == paper && !row.pictures.is_empty());
+        rows.for_each(|row| html += &pictures(row));
     }
     html + "</body>\n</html>\n"
+}
+
+/// The pictures of one row.
+fn pictures(row: &RowReport) -> String {
+    let figures: String = row
+        .pictures
+        .iter()
+        .map(|Picture { caption, png }| {
+            let (caption, png) = (escaped(caption), escaped(png));
+            format!("<figure><img src=\"{png}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>\n")
+        })
+        .collect();
+    let (place, what, theirs) = (escaped(row.place), escaped(&row.what), escaped(&row.theirs()));
+    format!("<h3>{place}: {what}</h3>\n<p class=\"quiet\">{theirs}</p>\n<div class=\"pictures\">\n{figures}</div>\n")
 }
 
 const EXPLANATION: &str = "Their figures stand as printed, on their scenes and graphics cards of their years; ours come \
@@ -246,6 +282,7 @@ mod tests {
             says: "",
             unit: "ms",
             outcome,
+            pictures: vec![Picture::reference("runs/a&b.png".into())],
             commands: vec![Command("linklight render 'a&b'".into())],
         };
         let rows = vec![
@@ -257,6 +294,7 @@ mod tests {
         let html = to_html(&report);
         assert_eq!(html.matches("<tr class=").count(), 3);
         assert!(html.contains("a &lt; b") && html.contains("x &amp; y") && !html.contains("a & b"));
+        assert_eq!(html.matches("<img src=\"runs/a&amp;b.png\"").count(), 3);
         assert_eq!(report.summary(), "3 rows: 1 won, 1 failed, 1 not measured");
         assert!(report.rows[0].line().contains("2.00 ms | 1.00 ms (x 0.500)"), "{}", report.rows[0].line());
     }

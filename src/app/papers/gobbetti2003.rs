@@ -15,6 +15,13 @@ fn gallery(triangles: &str, basis: &str) -> String {
     format!("builtin:gallery?triangles={triangles} {AS_THERE} --set irradiance_basis={basis}")
 }
 
+fn shown(basis: &str, options: &str) -> String {
+    format!(
+        "builtin:gallery?triangles=40000 --method face-cluster --bounces 5 --size 240x150 --spp 4 \
+         --set irradiance_basis={basis} {options}"
+    )
+}
+
 fn by_size(basis: &str) -> Vec<(String, String)> {
     SIZES.iter().map(|size| (format!("{size} triangles"), gallery(size, basis))).collect()
 }
@@ -104,6 +111,30 @@ pub fn rows() -> Vec<Row> {
             "volume clustering: 1 h 37 to 15 h 50",
             "radiosity by volume clusters is not one of our methods",
         ),
-        Row::not(METHOD, "Fig. 5", "frames of an interactive session", "pictures without figures to hold against"),
+        Row::views(
+            METHOD,
+            "Fig. 3, left",
+            ("leaves of the solution by basis of irradiance", "larger leaves with higher orders"),
+            "a room with three statues",
+            &["constant", "linear", "quadratic"].map(|basis| (basis, shown(basis, "--view elements"))),
+        ),
+        Row::pictures(
+            METHOD,
+            "Fig. 3, centre",
+            ("diffuse surfaces by basis of irradiance", "smoother with higher orders"),
+            "a room with three statues",
+            &["constant", "linear", "quadratic"].map(|basis| (basis, shown(basis, "--diffuse"))),
+        ),
+        Row::pictures(
+            METHOD,
+            "Fig. 3, right; Fig. 5",
+            (
+                "glossy surfaces by basis of irradiance",
+                "glossy reflection of indirect light, limited to the last bounce",
+            ),
+            "a room with three statues",
+            &["constant", "linear", "quadratic"].map(|basis| (basis, shown(basis, ""))),
+        ),
+        Row::not(METHOD, "Fig. 1 and 2", "a face cluster, two hierarchies", "drawings that explain the algorithm"),
     ]
 }

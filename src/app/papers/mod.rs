@@ -25,11 +25,14 @@ use super::values::parse_method;
 use super::{measure as device_facts, render};
 use crate::methods;
 use crate::report::errors::compare;
-use crate::report::papers_page::{Command, Outcome, Report, RowReport, SCHEMA, VERSION, Value, Verdict, to_html};
-use crate::report::tonemap::ToneSettings;
+use crate::report::image;
+use crate::report::papers_page::{
+    Command, Outcome, Picture, Report, RowReport, SCHEMA, VERSION, Value, Verdict, to_html,
+};
+use crate::report::tonemap::{ToneMap, ToneSettings};
 use crate::report::write::{FileError, write_text};
 use crate::stages::work::Watch;
-use row::{Measurement, Ours, Row, Theirs};
+use row::{Held, Measurement, Ours, Row, Theirs};
 
 /// All rows, paper by paper.
 fn rows() -> Vec<Row> {
@@ -122,13 +125,32 @@ impl Evidence<'_> {
         let commands =
             row.runs().into_iter().map(|run| Command(format!("linklight render {run} -o out.exr"))).collect();
         let (place, what, on) = (row.place, row.what.clone(), row.on);
-        Ok(RowReport { paper, method: row.method, place, what, on, theirs, says, unit, outcome, commands })
+        let pictures = self.pictures(row);
+        Ok(RowReport { paper, method: row.method, place, what, on, theirs, says, unit, outcome, pictures, commands })
+    }
+
+    /// The pictures of a row that were rendered; one of a reference stands behind those that are held to it.
+    fn pictures(&self, row: &Row) -> Vec<Picture> {
+        let beside = |path: &Path| path.strip_prefix(&self.args.output).unwrap_or(path).to_string_lossy().into_owned();
+        let mut pictures: Vec<Picture> = Vec::new();
+        let mut waiting: Option<String> = None;
+        for (caption, run) in row.shown() {
+            let Some(Ok(measured)) = self.measured.get(run) else { continue };
+            let reference = measured.reference.as_ref().filter(|_| row.has_reference).map(|held| beside(&held.png));
+            if waiting != reference {
+                pictures.extend(waiting.take().map(Picture::reference));
+            }
+            waiting = reference;
+            pictures.push(Picture { caption: caption.clone(), png: beside(&measured.png) });
+        }
+        pictures.extend(waiting.map(Picture::reference));
+        pictures
     }
 
     /// Measures a run unless it was; an error ends the program only where the user asked for the end.
     fn measure(&mut self, line: &str, has_reference: bool) -> Result<(), AppError> {
         let known = self.measured.get(line);
-        if known.is_some_and(|known| known.as_ref().map_or(true, |m| m.figures.is_some() || !has_reference)) {
+        if known.is_some_and(|known| known.as_ref().map_or(true, |m| m.reference.is_some() || !has_reference)) {
             return Ok(());
         }
         tracing::info!("linklight render {line}");
@@ -147,14 +169,24 @@ impl Evidence<'_> {
     fn run(&self, line: &str, has_reference: bool) -> Result<Measurement, AppError> {
         let [run, reference] = parse(line, &self.folder, self.global)?;
         let measured = measure(&run, self.args.frames, false, &self.watch)?;
-        let figures = if has_reference {
+        let tone = ToneSettings::default();
+        let rgb = &measured.picture.rgb;
+        let (reference, tone_map) = if has_reference {
             let quality = Quality { noise: self.args.noise, max_samples: self.args.reference_spp };
-            let reference = Reference::path_traced(&reference, quality, &self.watch)?;
-            Some(compare(&measured.picture, &reference.picture, None, &ToneSettings::default())?.figures)
+            let path_traced = Reference::path_traced(&reference, quality, &self.watch)?.picture;
+            let figures = compare(&measured.picture, &path_traced, None, &tone)?.figures;
+            let tone_map = tone.fit(&path_traced.rgb);
+            let png = reference.request.output.path.with_extension("png");
+            write_shown(&png, &path_traced, tone_map)?;
+            (Some(Held { png, figures }), tone_map)
         } else {
-            None
+            (None, tone.fit(rgb))
         };
-        Ok(Measurement { cost: measured.cost, frames: self.args.frames, figures })
+        let held = if has_reference { "held " } else { "" };
+        let name = blake3::hash(format!("{held}{line}").as_bytes()).to_hex();
+        let png = self.folder.join(format!("{}.png", &name.as_str()[..12]));
+        write_shown(&png, &measured.picture, tone_map)?;
+        Ok(Measurement { cost: measured.cost, frames: self.args.frames, png, reference })
     }
 
     /// What the runs of a row, all measured, say.
@@ -182,11 +214,20 @@ impl Evidence<'_> {
                     let verdict = if expected.holds(&numbers) { Verdict::Holds } else { Verdict::DoesNotHold };
                     Ok(Outcome::Trend { values, unit, expected: expected.in_words(), verdict })
                 }
+                (Ours::Pictures(runs), _) => {
+                    runs.iter().try_for_each(|(_, run)| found(run).map(drop))?;
+                    Ok(Outcome::Shown)
+                }
                 (_, _) => Err("the row has nothing to measure".into()),
             }
         };
         attempt().unwrap_or_else(Outcome::Failed)
     }
+}
+
+fn write_shown(path: &Path, picture: &image::Picture, tone_map: ToneMap) -> Result<(), AppError> {
+    let bytes = tone_map.to_bytes(&picture.rgb).bytes;
+    Ok(image::write_png(path, picture.width, picture.height, &bytes, &image::Metadata::new())?)
 }
 
 /// The run of a line of options, and its path-traced reference.
@@ -204,7 +245,8 @@ fn parse(line: &str, folder: &Path, global: &Global) -> Result<[Run; 2], AppErro
     let mut reference_options: Vec<String> = Vec::new();
     let mut rest = words.iter();
     while let Some(word) = rest.next() {
-        if word == "--set" {
+        // Settings and views are the method's own.
+        if word == "--set" || word == "--view" {
             rest.next();
         } else {
             reference_options.push(word.clone());

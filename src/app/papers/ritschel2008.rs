@@ -159,5 +159,61 @@ pub fn rows() -> Vec<Row> {
         "frames a second",
         "no built-in scene has two heads in a box",
     ));
+    rows.extend(pictures());
     rows
+}
+
+/// Figures without numbers.
+fn pictures() -> [Row; 5] {
+    let shown = |scene: &str, options: &str| {
+        format!("builtin:{scene} {METHOD_OPTION} --bounces 1 --size 240x150 --spp 4 {options}")
+    };
+    let glossy = "--edit material:0.roughness=0.3 --edit material:0.metallic=1";
+    [
+        Row::pictures(
+            METHOD,
+            "Fig. 1",
+            ("two bounces and a glossy one, gathered by pixels", "normal maps at 0.4 to 1.4 frames a second"),
+            "several scenes",
+            &["tea-room", "office"].map(|scene| (scene, shown(scene, "--set visibility=rays --display final-gather"))),
+        )
+        .slow(),
+        Row::views(
+            METHOD,
+            "Fig. 11",
+            ("a glossy box, and how many nodes its pixels gather from", "the cut grows where reflections are sharp"),
+            "glossy Cornell Box",
+            &[
+                ("light", shown("cornell-box", glossy)),
+                ("nodes of the cut", shown("cornell-box", &format!("{glossy} --view cut-size"))),
+            ],
+        )
+        .slow(),
+        Row::pictures(
+            METHOD,
+            "Fig. 12",
+            ("a glossy box without jitter and with it", "the bias of the senders shows; jittered frames converge"),
+            "highly glossy Cornell Box",
+            &[
+                ("without jitter", shown("cornell-box", &format!("{glossy} --set jitter=false"))),
+                ("jittered", shown("cornell-box", &format!("{glossy} --set jitter=true"))),
+            ],
+        )
+        .slow(),
+        Row::pictures(
+            METHOD,
+            "Fig. 17",
+            ("gathered by pixels, and by texels of the atlas", "indirect light itself is smooth in both"),
+            "two heads",
+            &["final-gather", "lightmap"]
+                .map(|display| (display, shown("cornell-box", &format!("--display {display}")))),
+        )
+        .slow(),
+        Row::not(
+            METHOD,
+            "Fig. 2, 3, 4, 6, 8, 9 and 10",
+            "maps, queries, traversals and the tree",
+            "drawings that explain the algorithm",
+        ),
+    ]
 }

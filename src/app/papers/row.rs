@@ -1,5 +1,7 @@
 //! A row of the papers' evidence: what a paper says, and how this program measures the same.
 
+use std::path::PathBuf;
+
 use serde_json::Value;
 
 use crate::report::compare_page::Cost;
@@ -51,6 +53,8 @@ pub enum Ours {
         value: fn(&Measurement) -> Option<f64>,
         expected: Trend,
     },
+    /// It is a picture: the same, rendered here, each with its caption.
+    Pictures(Vec<(String, String)>),
     /// It is not, and why.
     Not(&'static str),
 }
@@ -64,6 +68,8 @@ pub enum Trend {
     Rises,
     /// Largest over smallest at most this.
     Flat(f64),
+    /// The last over the first at most this.
+    RisesAtMost(f64),
     /// None above this.
     AtMost(f64),
 }
@@ -73,8 +79,16 @@ pub struct Measurement {
     pub cost: Cost,
     /// Frames in [`Cost::passes`].
     pub frames: u32,
-    /// Against the path-traced reference of the same options.
-    pub figures: Option<ErrorFigures>,
+    /// As a display shows it.
+    pub png: PathBuf,
+    /// The path-traced reference of the same options.
+    pub reference: Option<Held>,
+}
+
+/// A reference, and how far the measured picture is from it.
+pub struct Held {
+    pub png: PathBuf,
+    pub figures: ErrorFigures,
 }
 
 /// How far apart figures of like scenes may be and still be called alike.
@@ -126,6 +140,38 @@ impl Row {
         }
     }
 
+    /// A figure of the paper that holds pictures alone, beside path-traced references.
+    pub fn pictures(
+        method: &'static str,
+        place: &'static str,
+        (what, says): (&str, &'static str),
+        on: &'static str,
+        runs: &[(&str, String)],
+    ) -> Self {
+        Self { has_reference: true, ..Self::views(method, place, (what, says), on, runs) }
+    }
+
+    /// As [`Self::pictures`], of what no path tracer shows.
+    pub fn views(
+        method: &'static str,
+        place: &'static str,
+        (what, says): (&str, &'static str),
+        on: &'static str,
+        runs: &[(&str, String)],
+    ) -> Self {
+        let runs = runs.iter().map(|(caption, run)| ((*caption).to_owned(), run.clone())).collect();
+        Self {
+            method,
+            place,
+            what: what.to_owned(),
+            on,
+            theirs: Theirs::Words(says),
+            ours: Ours::Pictures(runs),
+            has_reference: false,
+            is_slow: false,
+        }
+    }
+
     pub fn not(method: &'static str, place: &'static str, what: &str, why: &'static str) -> Self {
         let (what, theirs, ours) = (what.to_owned(), Theirs::Words(""), Ours::Not(why));
         Self { method, place, what, on: "", theirs, ours, has_reference: false, is_slow: false }
@@ -152,8 +198,17 @@ impl Row {
     pub fn runs(&self) -> Vec<&str> {
         match &self.ours {
             Ours::Number { runs, .. } => runs.iter().map(String::as_str).collect(),
-            Ours::Trend { runs, .. } => runs.iter().map(|(_, run)| run.as_str()).collect(),
+            Ours::Trend { runs, .. } | Ours::Pictures(runs) => runs.iter().map(|(_, run)| run.as_str()).collect(),
             Ours::Not(_) => Vec::new(),
+        }
+    }
+
+    /// Captions and lines of options of the runs whose pictures belong on the page: those that show what is told.
+    pub fn shown(&self) -> &[(String, String)] {
+        match &self.ours {
+            Ours::Pictures(runs) => runs,
+            Ours::Trend { runs, .. } if self.has_reference => runs,
+            Ours::Trend { .. } | Ours::Number { .. } | Ours::Not(_) => &[],
         }
     }
 }
@@ -174,6 +229,7 @@ impl Trend {
             Self::Falls => last < first,
             Self::Rises => last > first,
             Self::Flat(ratio) => smallest > 0.0 && largest <= ratio * smallest,
+            Self::RisesAtMost(ratio) => last <= ratio * first,
             Self::AtMost(limit) => largest <= limit,
         }
     }
@@ -183,6 +239,7 @@ impl Trend {
             Self::Falls => "falls".into(),
             Self::Rises => "rises".into(),
             Self::Flat(ratio) => format!("largest over smallest at most {ratio}"),
+            Self::RisesAtMost(ratio) => format!("rises at most by {ratio}"),
             Self::AtMost(limit) => format!("at most {limit}"),
         }
     }
@@ -229,12 +286,16 @@ impl Measurement {
         (ms > 0.0).then(|| 1e3 / ms)
     }
 
+    fn figures(&self) -> Option<&ErrorFigures> {
+        Some(&self.reference.as_ref()?.figures)
+    }
+
     pub fn relative_mse(&self) -> Option<f64> {
-        self.figures?.relative_mse
+        self.figures()?.relative_mse
     }
 
     pub fn energy(&self) -> Option<f64> {
-        self.figures?.mean_ratio
+        self.figures()?.mean_ratio
     }
 }
 
@@ -262,6 +323,7 @@ mod tests {
         assert!(Trend::Falls.holds(&[3.0, 4.0, 1.0]) && !Trend::Falls.holds(&[1.0, 1.0]));
         assert!(Trend::Rises.holds(&[1.0, 2.0]) && !Trend::Rises.holds(&[]));
         assert!(Trend::Flat(1.12).holds(&[1.0, 1.1]) && !Trend::Flat(1.12).holds(&[1.0, 1.2]));
+        assert!(Trend::RisesAtMost(1.5).holds(&[2.0, 4.0, 3.0]) && !Trend::RisesAtMost(1.5).holds(&[2.0, 1.0, 3.1]));
         assert!(Trend::AtMost(2.0).holds(&[1.0, 2.0]) && !Trend::AtMost(2.0).holds(&[1.0, f64::NAN, 3.0]));
     }
 
