@@ -2,17 +2,19 @@
 //! checks them against each other. Commands that measure stand in `cli_evidence.rs`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 
 pub use super::cli_evidence::*;
 use super::console::Verbosity;
 use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
-    parse_method_or_auto, parse_place, parse_size, parse_turn,
+    parse_method, parse_method_or_auto, parse_pixel, parse_place, parse_size, parse_timeout, parse_turn,
 };
+use crate::gpu::LossPoint;
 use crate::methods::Method;
 use crate::methods::settings::Assignment;
 use crate::report::tonemap::Operator;
@@ -39,6 +41,16 @@ pub struct Global {
     /// Run with the Vulkan validation layers; any error they report fails the command
     #[arg(long, global = true)]
     pub validate: bool,
+    /// Give up on GPU work that does not end within this long, seconds [default: 600]
+    #[arg(long, global = true, value_name = "SECONDS", value_parser = parse_timeout)]
+    pub gpu_timeout: Option<Duration>,
+    /// Where to tell of a lost GPU [default: crash-*.json in the user's cache folder]
+    #[arg(long, global = true, value_name = "FILE.json")]
+    pub crash_file: Option<PathBuf>,
+    /// Lose the GPU on purpose when it comes to this pass (as --profile names it, gather/links@3 its third run), to see
+    /// what is told of it
+    #[arg(long, global = true, value_name = "PASS[@N]")]
+    pub lose_device_at: Option<LossPoint>,
     /// Say nothing but errors
     #[arg(long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
@@ -196,6 +208,12 @@ pub struct RenderArgs {
     /// Write a RenderDoc capture of the last frame
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+    /// Tell which elements, links and bounces make up this pixel, counted from the top left corner
+    #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
+    pub explain: Option<UVec2>,
+    /// ... and write all of them as JSON
+    #[arg(long, value_name = "FILE.json", requires = "explain")]
+    pub explain_json: Option<PathBuf>,
     /// Write hashes of what every pass leaves in its buffers, for `linklight diverge`
     #[arg(long, value_name = "FILE.json")]
     pub hashes: Option<PathBuf>,
@@ -208,6 +226,12 @@ pub struct ViewArgs {
     /// Folder of screenshots and states
     #[arg(long, value_name = "DIR", default_value = ".")]
     pub shots: PathBuf,
+    /// Show another method beside the picture; path-tracing is the reference, which goes on refining
+    #[arg(long, value_name = "KEY", value_parser = parse_method)]
+    pub against: Option<&'static Method>,
+    /// ... or how far the picture is from it
+    #[arg(long, requires = "against")]
+    pub difference: bool,
     /// Start with the panels hidden: the picture fills the window
     #[arg(long)]
     pub bare: bool,

@@ -49,7 +49,7 @@ fn write_device(device: &DeviceInfo, taken: Option<usize>, out: &mut dyn Write) 
     Ok(())
 }
 
-fn optional(features: &OptionalFeatures) -> [(&'static str, bool); 7] {
+fn optional(features: &OptionalFeatures) -> [(&'static str, bool); 8] {
     [
         ("ray query", features.ray_query),
         ("16-bit storage", features.storage_16bit),
@@ -57,6 +57,7 @@ fn optional(features: &OptionalFeatures) -> [(&'static str, bool); 7] {
         ("memory budget", features.memory_budget),
         ("calibrated timestamps", features.calibrated_timestamps),
         ("device fault", features.device_fault),
+        ("buffer markers", features.buffer_marker),
         ("sampler anisotropy", features.sampler_anisotropy),
     ]
 }

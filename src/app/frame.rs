@@ -52,29 +52,29 @@ pub enum Solved<'a> {
 
 /// Face-cluster radiosity with the display stage that shows it.
 pub struct FaceClustersShown {
-    method: FaceClusters,
-    shadow_maps: ShadowMaps,
-    g_buffer: GBuffer,
+    pub(super) method: FaceClusters,
+    pub(super) shadow_maps: ShadowMaps,
+    pub(super) g_buffer: GBuffer,
 }
 
 /// A method with the display stages that show it.
 pub struct VertexShown {
-    method: Box<dyn OnElements>,
-    shadow_maps: ShadowMaps,
-    g_buffer: GBuffer,
-    gather: Option<Gather>,
+    pub(super) method: Box<dyn OnElements>,
+    pub(super) shadow_maps: ShadowMaps,
+    pub(super) g_buffer: GBuffer,
+    pub(super) gather: Option<Gather>,
     /// Where flat patches are drawn.
-    splat_sums: Option<SplatSums>,
+    pub(super) splat_sums: Option<SplatSums>,
 }
 
 /// The final gather, and the tree that the method's vertices fill.
-struct Gather {
+pub(super) struct Gather {
     leaves: VertexLeaves,
     display: FinalGather,
 }
 
 /// What a method sees of a staged scene.
-fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibility::Stage<'a> {
+pub(super) fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibility::Stage<'a> {
     explicit_visibility::Stage {
         scene: &stage.scene,
         geometry: &stage.geometry,
@@ -87,7 +87,7 @@ fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> explicit_visibi
 }
 
 /// As [`explicit_stage`], for face clusters.
-fn cluster_stage<'a>(
+pub(super) fn cluster_stage<'a>(
     stage: &'a Stage,
     cluster_cache: Option<&'a Path>,
     watch: &'a dyn Watch,

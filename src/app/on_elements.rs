@@ -2,7 +2,8 @@
 
 use super::AppError;
 use crate::gpu::{Buffer, Context};
-use crate::methods::antiradiance::Antiradiance;
+use crate::methods::antiradiance::{Antiradiance, Scheme};
+use crate::methods::carried::Carried;
 use crate::methods::explicit_visibility::{ExplicitVisibility, Stage};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::pick::picked_element;
@@ -35,6 +36,29 @@ pub trait OnElements {
         Ok((self.direct_irradiance(), self.indirect_irradiance()))
     }
 
+    /// As [`Self::solve`], with the links there are.
+    fn solve_again(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
+        self.solve(context, stage, bounces)
+    }
+
+    /// Angle between normals, radians, below which neighbours' indirect light is averaged; `None` without smoothing.
+    fn smoothing(&self) -> Option<f32>;
+
+    /// Whether [`Self::carried_to`] tells links.
+    fn keeps_links(&self) -> bool {
+        false
+    }
+
+    /// Whether a solve of fewer bounces is the first part of one of more.
+    fn bounces_are_apart(&self) -> bool {
+        true
+    }
+
+    /// What an element received in the last bounce of the last solve, link by link.
+    fn carried_to(&self, _: &Context, _: u32) -> Result<Vec<Carried>, AppError> {
+        Ok(Vec::new())
+    }
+
     /// Flat patches for the splatting display, if the method has them.
     fn splats(&self) -> Option<&Splats> {
         None
@@ -57,6 +81,11 @@ macro_rules! as_it_is {
 
         fn elements(&self) -> &Elements {
             Self::elements(self)
+        }
+
+        fn smoothing(&self) -> Option<f32> {
+            let settings = self.settings();
+            settings.smoothing.then(|| settings.feature_angle.to_radians())
         }
 
         fn facts(&self) -> serde_json::Result<Value> {
@@ -84,6 +113,14 @@ impl OnElements for ExplicitVisibility {
         Ok(recorder.submit()?)
     }
 
+    fn keeps_links(&self) -> bool {
+        true
+    }
+
+    fn carried_to(&self, context: &Context, element: u32) -> Result<Vec<Carried>, AppError> {
+        Ok(Self::carried_to(self, context, element)?)
+    }
+
     as_it_is!();
 }
 
@@ -91,9 +128,21 @@ impl OnElements for ImplicitVisibility {
     fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
         self.link(context, stage).map_err(AppError::failed)?;
         tracing::info!("{}", self.report());
+        self.solve_again(context, stage, bounces)
+    }
+
+    fn solve_again(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
         let mut recorder = context.recorder("frame")?;
         recorder.scope("implicit-visibility", |recorder| Self::solve(self, recorder, stage.world, bounces));
         Ok(recorder.submit()?)
+    }
+
+    fn keeps_links(&self) -> bool {
+        true
+    }
+
+    fn carried_to(&self, context: &Context, element: u32) -> Result<Vec<Carried>, AppError> {
+        Ok(Self::carried_to(self, context, element)?)
     }
 
     as_it_is!();
@@ -144,6 +193,10 @@ impl OnElements for Antiradiance {
 
     fn splats(&self) -> Option<&Splats> {
         Some(Self::splats(self))
+    }
+
+    fn bounces_are_apart(&self) -> bool {
+        self.settings().scheme == Scheme::Asymmetric
     }
 
     fn false_colors(

@@ -24,6 +24,14 @@ pub struct TexelsShown {
     shown: Shown,
 }
 
+/// See [`TexelsShown::lightmap`].
+pub struct LightmapShown<'a> {
+    pub display: &'a Lightmap,
+    pub shadow_maps: &'a ShadowMaps,
+    pub g_buffer: &'a GBuffer,
+    pub method: &'a SurfaceShadowMaps,
+}
+
 enum Shown {
     FinalGather(FinalGather),
     Lightmap(Box<Lightmap>),
@@ -70,6 +78,15 @@ impl TexelsShown {
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         Ok(Self { method, shadow_maps, g_buffer, shown })
+    }
+
+    /// What shows the atlas, where it is shown by a filter over its texels.
+    pub fn lightmap(&self) -> Option<LightmapShown<'_>> {
+        let Self { method, shadow_maps, g_buffer, shown } = self;
+        match shown {
+            Shown::Lightmap(display) => Some(LightmapShown { display, shadow_maps, g_buffer, method }),
+            Shown::FinalGather(_) => None,
+        }
     }
 
     pub fn report(&self) -> Report {

@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 use std::time::Instant;
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use serde_json::{Map, Value, json};
 
 use super::cli::{Channel, Display, Global, PictureArgs, Rays, RenderArgs};
@@ -16,7 +16,7 @@ use super::output::Measured;
 use super::stage::Stage;
 use super::target::{self, Picked, Target};
 use super::values::{CameraChoice, Format, Output, SceneSource};
-use super::{AppError, frame, output, views};
+use super::{AppError, crash, explain, frame, output, views};
 use crate::display::final_gather;
 pub use crate::display::tone_map::LightParts;
 use crate::gpu::{Capture, Context, Options, prepare_capture};
@@ -24,7 +24,7 @@ use crate::methods::settings::{Assignment, SettingGroup, SettingValue as _};
 use crate::methods::{AUTO, METHODS, Method};
 use crate::report::tonemap::ToneSettings;
 use crate::report::trace::TimeLine;
-use crate::report::write::check_writable;
+use crate::report::write::{check_writable, write_text};
 use crate::scene::environment::load::EnvironmentSource;
 use crate::stages::film::Film;
 
@@ -81,6 +81,8 @@ pub struct RenderRequest {
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
     pub hashes: Option<PathBuf>,
+    /// A pixel to explain, and where to write all of it.
+    pub explain: Option<(UVec2, Option<PathBuf>)>,
     /// Settings are picked for this error first.
     pub target: Option<Target>,
 }
@@ -139,8 +141,12 @@ impl TryFrom<RenderArgs> for RenderRequest {
         }
         let mut request = Self::of_picture(&picture, args.output)?;
 
+        if let Some(pixel) = args.explain {
+            explain::check(&request, pixel)?;
+        }
         let mut written = vec![&request.output.path];
-        written.extend([&args.lightmap, &args.profile, &args.trace, &args.capture, &args.hashes].into_iter().flatten());
+        let others = [&args.lightmap, &args.profile, &args.trace, &args.capture, &args.hashes, &args.explain_json];
+        written.extend(others.into_iter().flatten());
         for (index, path) in written.iter().enumerate() {
             if written[..index].contains(path) {
                 return usage(format!("two outputs are called {}; give each its own name", path.display()));
@@ -159,6 +165,7 @@ impl TryFrom<RenderArgs> for RenderRequest {
         request.trace = args.trace;
         request.capture = args.capture;
         request.hashes = args.hashes;
+        request.explain = args.explain.map(|pixel| (pixel, args.explain_json));
         request.target = args.target_error.map(|error| Target { error, any_method });
         Ok(request)
     }
@@ -243,6 +250,7 @@ impl RenderRequest {
             trace: None,
             capture: None,
             hashes: None,
+            explain: None,
             target: None,
         })
     }
@@ -338,7 +346,7 @@ fn render(
     }
     let time_line = TimeLine::default();
     let counts = Counts { statistics: request.profile.is_some(), hashes: request.hashes.is_some() };
-    let context = time_line.span("open device", || open_counting_device(global, counts))?;
+    let context = time_line.span("open device", || open_counting_device(global, counts, request.record()?))?;
     let device = context.info();
     tracing::info!("device {} {} ({})", device.index, device.name, device.driver);
     let mut capture = request.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
@@ -378,13 +386,22 @@ fn render(
     if let Some(path) = &request.hashes {
         output::write_hashes(request, &context, path)?;
     }
+    if let (Some((pixel, file)), None) = (&request.explain, &partial) {
+        let frame = explain::Frame { context: &context, request, stage: &stage, film: &film, watch: &watch };
+        let explanation = explain::explain(frame, &mut method, *pixel)?;
+        write!(out, "{}", explanation.to_text())?;
+        if let Some(path) = file {
+            write_text(path, &format!("{:#}\n", explanation.to_json()))?;
+        }
+        explanation.check().map_err(AppError::failed)?;
+    }
     check_validation(&context)?;
     partial.map_or(Ok(()), Err)
 }
 
 /// The device of the global options; `statistics` counts what each pass does.
 pub fn open_device(global: &Global, statistics: bool) -> Result<Context, AppError> {
-    open_counting_device(global, Counts { statistics, hashes: false })
+    open_counting_device(global, Counts { statistics, hashes: false }, Map::new())
 }
 
 /// What is kept of every pass.
@@ -394,16 +411,26 @@ struct Counts {
     hashes: bool,
 }
 
-fn open_counting_device(global: &Global, counts: Counts) -> Result<Context, AppError> {
+fn open_counting_device(global: &Global, counts: Counts, settings: Map<String, Value>) -> Result<Context, AppError> {
     let options = Options {
-        gpu: global.gpu.clone(),
-        validation: global.validate,
         statistics: counts.statistics,
         hash_passes: counts.hashes,
-        pipeline_cache: pipeline_cache(),
-        ..Options::default()
+        on_loss: Some(crash::hook(global, settings, crash::own_command)),
+        ..device_options(global)
     };
     Ok(Context::new(options)?)
+}
+
+/// What the global options say of a device.
+pub(super) fn device_options(global: &Global) -> Options {
+    Options {
+        gpu: global.gpu.clone(),
+        validation: global.validate,
+        pipeline_cache: pipeline_cache(),
+        timeout: global.gpu_timeout,
+        lose_device_at: global.lose_device_at.clone(),
+        ..Options::default()
+    }
 }
 
 /// Fails where validation had anything to say.

@@ -3,8 +3,9 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use serde_json::Value;
 
 use crate::methods::settings::suggest;
@@ -196,6 +197,21 @@ pub fn parse_fraction(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number > 0.0 && number <= 1.0 => Ok(number),
         _ => Err("expected a number above 0, at most 1".to_owned()),
+    }
+}
+
+/// `--explain`.
+pub fn parse_pixel(text: &str) -> Result<UVec2, String> {
+    let pixel =
+        text.split_once(',').and_then(|(x, y)| Some(UVec2::new(x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    pixel.ok_or_else(|| "expected a pixel as X,Y, such as 480,270".to_owned())
+}
+
+/// `--gpu-timeout`: seconds, at most a day.
+pub fn parse_timeout(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if seconds > 0.0 && seconds <= 86_400.0 => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("expected seconds above 0, at most 86400".to_owned()),
     }
 }
 

@@ -7,7 +7,7 @@ use std::io::Write;
 
 use super::AppError;
 use super::cli::{Display, PictureArgs};
-use super::render::displays;
+use super::render::{RenderRequest, displays};
 use crate::display::final_gather;
 use crate::methods::settings::{Assignment, ChoiceValue, Kind, SettingGroup as _, Spec, suggest};
 use crate::methods::{METHODS, Method};
@@ -60,6 +60,14 @@ pub fn resolve(args: &mut PictureArgs) -> Result<(), AppError> {
     Err(AppError::Usage(format!("{of} has no view {name:?}; {hint} (linklight methods --views lists all)")))
 }
 
+/// Whether a picture shows a view in place of light.
+pub fn is_shown(request: &RenderRequest) -> bool {
+    let views = of_method(request.method).into_iter().chain(of_final_gather());
+    let mut asked = request.assignments.iter().chain(&request.display_assignments);
+    let names: Vec<DebugView> = views.collect();
+    asked.any(|set| names.iter().any(|view| view.setting == set.key && view.value.name == set.value))
+}
+
 /// Every view with what it shows.
 pub fn list(out: &mut dyn Write) -> Result<(), AppError> {
     for method in METHODS {
@@ -84,7 +92,6 @@ mod tests {
 
     use super::*;
     use crate::app::cli::{Cli, Command};
-    use crate::app::render::RenderRequest;
     use crate::app::values::{Format, Output};
 
     fn request(options: &str) -> Result<RenderRequest, String> {

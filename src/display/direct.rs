@@ -65,6 +65,18 @@ pub fn draw(
     film: &Film,
 ) {
     g_buffer.draw(recorder, world, view);
+    shade(recorder, (world, shadow_maps, g_buffer), view, sample, world.light_count, film);
+}
+
+/// What is seen in a G-buffer that was drawn, lit by the first `light_count` punctual lights of the world.
+pub fn shade(
+    recorder: &mut Recorder<'_>,
+    (world, shadow_maps, g_buffer): (&World, &ShadowMaps, &GBuffer),
+    view: &PixelView,
+    sample: Sample,
+    light_count: u32,
+    film: &Film,
+) {
     let pass = Direct {
         visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
         g_position: g_buffer.sampled(&g_buffer.position),
@@ -90,7 +102,7 @@ pub fn draw(
             eye: view.eye,
             forward: view.forward,
             eye_along: view.eye_along,
-            light_count: world.light_count,
+            light_count,
             weight: 1.0 / sample.samples as f32,
             is_first: u32::from(sample.index == 0),
             is_unlit: u32::from(sample.is_unlit),

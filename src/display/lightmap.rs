@@ -3,6 +3,7 @@
 //! The filter is the uniform cubic B-spline over the texels of the chart that is seen; texels of other charts and empty
 //! ones are left out, so that nothing bleeds in over the border.
 
+use super::PixelView;
 use super::direct::Canvas;
 use crate::gpu::shaders::display::{Lightmap as Pass, LightmapParams};
 use crate::gpu::shaders::types::TriangleCorners;
@@ -45,33 +46,45 @@ impl Lightmap {
 
     /// Fills the canvas' film.
     pub fn draw(&self, recorder: &mut Recorder<'_>, light: TexelLight<'_>, canvas: Canvas<'_>) {
-        let Canvas { world, g_buffer, film, .. } = canvas;
         canvas.draw(recorder, false, |recorder, pixel_view, weight| {
-            let pass = Pass {
-                visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-                g_position: g_buffer.sampled(&g_buffer.position),
-                g_normal: g_buffer.sampled(&g_buffer.normal),
-                g_albedo: g_buffer.sampled(&g_buffer.albedo),
-                g_specular: g_buffer.sampled(&g_buffer.specular),
-                g_emission: g_buffer.sampled(&g_buffer.emission),
-                triangles: &world.triangles,
-                positions: &world.positions,
-                corner_places: &self.corner_places,
-                texel_at: &self.texel_at,
-                texel_charts: &self.texel_charts,
-                direct_irradiance: light.direct_irradiance,
-                indirect_irradiance: light.indirect_irradiance,
-                direct: &film.direct,
-                indirect: &film.indirect,
-                params: LightmapParams {
-                    eye: pixel_view.eye,
-                    weight,
-                    resolution: self.resolution,
-                    triangle_count: self.triangle_count,
-                },
-            };
-            recorder.dispatch(&pass, [film.width, film.height]);
+            self.add(recorder, light, canvas, pixel_view, weight);
         });
+    }
+
+    /// What a sample adds to the film, the G-buffer being drawn.
+    pub fn add(
+        &self,
+        recorder: &mut Recorder<'_>,
+        light: TexelLight<'_>,
+        canvas: Canvas<'_>,
+        pixel_view: &PixelView,
+        weight: f32,
+    ) {
+        let Canvas { world, g_buffer, film, .. } = canvas;
+        let pass = Pass {
+            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+            g_position: g_buffer.sampled(&g_buffer.position),
+            g_normal: g_buffer.sampled(&g_buffer.normal),
+            g_albedo: g_buffer.sampled(&g_buffer.albedo),
+            g_specular: g_buffer.sampled(&g_buffer.specular),
+            g_emission: g_buffer.sampled(&g_buffer.emission),
+            triangles: &world.triangles,
+            positions: &world.positions,
+            corner_places: &self.corner_places,
+            texel_at: &self.texel_at,
+            texel_charts: &self.texel_charts,
+            direct_irradiance: light.direct_irradiance,
+            indirect_irradiance: light.indirect_irradiance,
+            direct: &film.direct,
+            indirect: &film.indirect,
+            params: LightmapParams {
+                eye: pixel_view.eye,
+                weight,
+                resolution: self.resolution,
+                triangle_count: self.triangle_count,
+            },
+        };
+        recorder.dispatch(&pass, [film.width, film.height]);
     }
 }
 

@@ -6,6 +6,7 @@
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
+use super::PixelView;
 use super::direct::Canvas;
 use super::vertex::VertexLight;
 use crate::gpu::shaders::display::{Splat, SplatNormalize, SplatNormalizeParams, SplatParams};
@@ -43,40 +44,49 @@ pub struct SplatLight<'a> {
 
 /// Fills the canvas' film.
 pub fn draw(recorder: &mut Recorder<'_>, light: SplatLight<'_>, canvas: Canvas<'_>) {
+    canvas.draw(recorder, false, |recorder, pixel_view, weight| add(recorder, light, canvas, pixel_view, weight));
+}
+
+/// What a sample adds to the film, the G-buffer being drawn.
+pub fn add(
+    recorder: &mut Recorder<'_>,
+    light: SplatLight<'_>,
+    canvas: Canvas<'_>,
+    pixel_view: &PixelView,
+    weight: f32,
+) {
     let Canvas { world, g_buffer, film, .. } = canvas;
     let SplatLight { vertices, splats, sums } = light;
-    canvas.draw(recorder, false, |recorder, pixel_view, weight| {
-        let splat = Splat {
-            splats: &splats.splats,
-            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-            g_position: g_buffer.sampled(&g_buffer.position),
-            triangle_surfaces: &splats.triangle_surfaces,
-            direct_irradiance: vertices.direct_irradiance,
-            indirect_irradiance: vertices.indirect_irradiance,
-            params: SplatParams { clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(), eye: pixel_view.eye },
-        };
-        let clear = Load::Clear([0.0; 4]);
-        let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
-        let state = RasterState { blend: Blend::Add, ..RasterState::default() };
-        recorder.draw(&splat, &target, state, CORNERS, splats.count);
-        let normalize = SplatNormalize {
-            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-            g_position: g_buffer.sampled(&g_buffer.position),
-            g_normal: g_buffer.sampled(&g_buffer.normal),
-            g_albedo: g_buffer.sampled(&g_buffer.albedo),
-            g_specular: g_buffer.sampled(&g_buffer.specular),
-            g_emission: g_buffer.sampled(&g_buffer.emission),
-            triangles: &world.triangles,
-            positions: &world.positions,
-            direct_irradiance: vertices.direct_irradiance,
-            indirect_irradiance: vertices.indirect_irradiance,
-            back_elements: vertices.back_elements,
-            direct: &film.direct,
-            indirect: &film.indirect,
-            direct_splats: g_buffer.sampled(&sums.direct),
-            indirect_splats: g_buffer.sampled(&sums.indirect),
-            params: SplatNormalizeParams { eye: pixel_view.eye, weight },
-        };
-        recorder.dispatch(&normalize, [film.width, film.height]);
-    });
+    let splat = Splat {
+        splats: &splats.splats,
+        visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+        g_position: g_buffer.sampled(&g_buffer.position),
+        triangle_surfaces: &splats.triangle_surfaces,
+        direct_irradiance: vertices.direct_irradiance,
+        indirect_irradiance: vertices.indirect_irradiance,
+        params: SplatParams { clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(), eye: pixel_view.eye },
+    };
+    let clear = Load::Clear([0.0; 4]);
+    let target = Target { color: vec![(&sums.direct, clear), (&sums.indirect, clear)], depth: None };
+    let state = RasterState { blend: Blend::Add, ..RasterState::default() };
+    recorder.draw(&splat, &target, state, CORNERS, splats.count);
+    let normalize = SplatNormalize {
+        visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+        g_position: g_buffer.sampled(&g_buffer.position),
+        g_normal: g_buffer.sampled(&g_buffer.normal),
+        g_albedo: g_buffer.sampled(&g_buffer.albedo),
+        g_specular: g_buffer.sampled(&g_buffer.specular),
+        g_emission: g_buffer.sampled(&g_buffer.emission),
+        triangles: &world.triangles,
+        positions: &world.positions,
+        direct_irradiance: vertices.direct_irradiance,
+        indirect_irradiance: vertices.indirect_irradiance,
+        back_elements: vertices.back_elements,
+        direct: &film.direct,
+        indirect: &film.indirect,
+        direct_splats: g_buffer.sampled(&sums.direct),
+        indirect_splats: g_buffer.sampled(&sums.indirect),
+        params: SplatNormalizeParams { eye: pixel_view.eye, weight },
+    };
+    recorder.dispatch(&normalize, [film.width, film.height]);
 }

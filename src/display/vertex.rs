@@ -1,5 +1,6 @@
 //! Vertex display: punctual light per pixel by shadow maps, all other light interpolated between vertices.
 
+use super::PixelView;
 use super::direct::Canvas;
 use crate::gpu::shaders::display::{Vertex, VertexParams};
 use crate::gpu::{Buffer, Recorder};
@@ -20,24 +21,29 @@ pub struct VertexLight<'a> {
 
 /// Fills the canvas' film.
 pub fn draw(recorder: &mut Recorder<'_>, light: VertexLight<'_>, canvas: Canvas<'_>) {
-    let Canvas { world, g_buffer, film, .. } = canvas;
     canvas.draw(recorder, light.colors.is_some(), |recorder, pixel_view, weight| {
-        let pass = Vertex {
-            visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
-            g_position: g_buffer.sampled(&g_buffer.position),
-            g_normal: g_buffer.sampled(&g_buffer.normal),
-            g_albedo: g_buffer.sampled(&g_buffer.albedo),
-            g_specular: g_buffer.sampled(&g_buffer.specular),
-            g_emission: g_buffer.sampled(&g_buffer.emission),
-            triangles: &world.triangles,
-            positions: &world.positions,
-            direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
-            indirect_irradiance: light.indirect_irradiance,
-            back_elements: light.back_elements,
-            direct: &film.direct,
-            indirect: &film.indirect,
-            params: VertexParams { eye: pixel_view.eye, weight, shows_colors: u32::from(light.colors.is_some()) },
-        };
-        recorder.dispatch(&pass, [film.width, film.height]);
+        add(recorder, light, canvas, pixel_view, weight);
     });
+}
+
+/// What a sample adds to the film, the G-buffer being drawn.
+pub fn add(recorder: &mut Recorder<'_>, light: VertexLight<'_>, canvas: Canvas<'_>, view: &PixelView, weight: f32) {
+    let Canvas { world, g_buffer, film, .. } = canvas;
+    let pass = Vertex {
+        visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
+        g_position: g_buffer.sampled(&g_buffer.position),
+        g_normal: g_buffer.sampled(&g_buffer.normal),
+        g_albedo: g_buffer.sampled(&g_buffer.albedo),
+        g_specular: g_buffer.sampled(&g_buffer.specular),
+        g_emission: g_buffer.sampled(&g_buffer.emission),
+        triangles: &world.triangles,
+        positions: &world.positions,
+        direct_irradiance: light.colors.unwrap_or(light.direct_irradiance),
+        indirect_irradiance: light.indirect_irradiance,
+        back_elements: light.back_elements,
+        direct: &film.direct,
+        indirect: &film.indirect,
+        params: VertexParams { eye: view.eye, weight, shows_colors: u32::from(light.colors.is_some()) },
+    };
+    recorder.dispatch(&pass, [film.width, film.height]);
 }

@@ -108,6 +108,11 @@ impl RawBuffer {
         }
     }
 
+    /// The mapped bytes as they are now.
+    pub fn mapped_now(&self) -> &[u8] {
+        self.allocation.as_ref().and_then(Allocation::mapped_slice).unwrap_or(&[])
+    }
+
     /// The mapped bytes of a staging buffer.
     pub fn mapped(&mut self) -> &mut [u8] {
         self.allocation.as_mut().and_then(Allocation::mapped_slice_mut).unwrap_or(&mut [])

@@ -5,6 +5,7 @@ use super::error::{Checked, GpuError};
 use super::features::OptionalFeatures;
 use super::image::{Image, ImageDescription, Sampler, SamplerDescription, TextureTable};
 use super::instance::Instance;
+use super::loss::{LossHook, LossPoint, Markers};
 use super::pass_hashes::PassHash;
 use super::pipelines::Pipelines;
 use super::profiler::{ClockPair, PassRecord};
@@ -16,6 +17,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// How a context is made.
 #[derive(Debug, Clone, Default)]
@@ -40,9 +42,16 @@ pub struct Options {
     pub pipeline_cache: Option<PathBuf>,
     /// Ready to show images in windows; see [`super::Presenter`].
     pub presents: bool,
-    /// Give up on a submission after this long, seconds; 0 takes the default of ten minutes.
-    pub timeout_seconds: u64,
+    /// Give up on a submission after this long; ten minutes where empty.
+    pub timeout: Option<Duration>,
+    /// Lose the device here, on purpose: the submission ends before that pass, and fails as a lost one does.
+    pub lose_device_at: Option<LossPoint>,
+    /// Hears of a loss.
+    pub on_loss: Option<LossHook>,
 }
+
+/// How long a submission may take where nothing else is said.
+const DEFAULT_TIMEOUT: Duration = Duration::from_secs(600);
 
 /// Pipeline statistics in bit order; see `STATISTICS` of the recorder for their names.
 pub(super) const STATISTIC_FLAGS: vk::QueryPipelineStatisticFlags = vk::QueryPipelineStatisticFlags::from_raw(
@@ -55,6 +64,7 @@ pub(super) const STATISTIC_FLAGS: vk::QueryPipelineStatisticFlags = vk::QueryPip
 pub struct Context {
     pub(super) options: Options,
     pub(super) pipelines: Pipelines,
+    pub(super) markers: Markers,
     pub(super) queue_lock: Mutex<()>,
     slots: Mutex<Vec<CommandSlot>>,
     records: Mutex<Vec<PassRecord>>,
@@ -77,9 +87,11 @@ impl Context {
         let device = Arc::new(device);
         tracing::debug!("device {} {} ({})", device.info.index, device.info.name, device.info.driver);
         let pipelines = Pipelines::new(&device, options.pipeline_cache.clone())?;
+        let markers = Markers::new(&device)?;
         Ok(Self {
             options,
             pipelines,
+            markers,
             queue_lock: Mutex::default(),
             slots: Mutex::default(),
             records: Mutex::default(),
@@ -193,41 +205,20 @@ impl Context {
 
     /// Waits until submission `value` is complete.
     pub(super) fn wait(&self, value: u64, last_pass: &str) -> Result<(), GpuError> {
-        let seconds = if self.options.timeout_seconds == 0 { 600 } else { self.options.timeout_seconds };
+        let patience = self.options.timeout.unwrap_or(DEFAULT_TIMEOUT);
         let (semaphores, values) = ([self.device.timeline], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        let nanoseconds = u64::try_from(patience.as_nanos()).unwrap_or(u64::MAX);
         // SAFETY: the semaphore is alive.
-        match unsafe { self.device.raw.wait_semaphores(&info, seconds.saturating_mul(1_000_000_000)) } {
+        match unsafe { self.device.raw.wait_semaphores(&info, nanoseconds) } {
             Ok(()) => {
                 self.device.completed.fetch_max(value, Ordering::AcqRel);
                 Ok(())
             }
             Err(vk::Result::TIMEOUT) => {
-                self.device.is_lost.store(true, Ordering::Release);
-                Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds })
+                Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds: patience.as_secs_f64() })
             }
-            Err(error) => Err(self.with_fault(GpuError::from_call("vkWaitSemaphores", error, last_pass))),
-        }
-    }
-
-    /// Adds what the driver tells of a device loss.
-    pub(super) fn with_fault(&self, error: GpuError) -> GpuError {
-        if matches!(error, GpuError::DeviceLost { .. }) {
-            self.device.is_lost.store(true, Ordering::Release);
-        }
-        match (error, &self.device.device_fault) {
-            (GpuError::DeviceLost { last_pass, .. }, Some(extension)) => {
-                let mut counts = vk::DeviceFaultCountsEXT::default();
-                let mut info = vk::DeviceFaultInfoEXT::default();
-                // SAFETY: with zero counts only the description is written, into `info` itself.
-                let told = unsafe {
-                    (extension.fp().get_device_fault_info_ext)(self.device.raw.handle(), &mut counts, &mut info)
-                };
-                let text = info.description_as_c_str().map(|d| d.to_string_lossy().into_owned()).unwrap_or_default();
-                let known = matches!(told, vk::Result::SUCCESS | vk::Result::INCOMPLETE) && !text.is_empty();
-                GpuError::DeviceLost { last_pass, fault: if known { format!(" ({text})") } else { String::new() } }
-            }
-            (error, _) => error,
+            Err(error) => Err(GpuError::from_call("vkWaitSemaphores", error, last_pass)),
         }
     }
 
@@ -312,6 +303,10 @@ impl Context {
 
 impl Drop for Context {
     fn drop(&mut self) {
+        // What a hung device may be using stays; see `loss`.
+        if self.device.is_hung.load(Ordering::Acquire) {
+            return;
+        }
         // SAFETY: the device is drained before its command and query pools go.
         unsafe {
             let raw = &self.device.raw;

@@ -4,7 +4,7 @@ use super::error::{Checked, GpuError};
 use super::features::{FeatureChain, OptionalFeatures};
 use super::instance::Instance;
 use super::selection::{Candidate, DeviceInfo};
-use ash::{ext, khr, vk};
+use ash::{amd, ext, khr, vk};
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use std::collections::BTreeMap;
@@ -43,6 +43,7 @@ pub(super) struct Device {
     pub acceleration_structure: Option<khr::acceleration_structure::Device>,
     pub calibrated_timestamps: Option<ext::calibrated_timestamps::Device>,
     pub device_fault: Option<ext::device_fault::Device>,
+    pub buffer_marker: Option<amd::buffer_marker::Device>,
     dynamic_rendering: Option<khr::dynamic_rendering::Device>,
     synchronization2: Option<khr::synchronization2::Device>,
     debug_utils: Option<ext::debug_utils::Device>,
@@ -54,6 +55,8 @@ pub(super) struct Device {
     pub open_recorders: AtomicU64,
     /// It was lost, or never finished: nothing more will come of it.
     pub is_lost: AtomicBool,
+    /// It did not finish in time, and may be at work for ever: nothing that it uses is given back.
+    pub is_hung: AtomicBool,
     next_id: AtomicU64,
     allocator: Mutex<Option<Allocator>>,
     graveyard: Mutex<Vec<Grave>>,
@@ -171,6 +174,8 @@ impl Device {
                     .calibrated_timestamps
                     .then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &raw)),
                 device_fault: optional.device_fault.then(|| ext::device_fault::Device::new(&instance.raw, &raw)),
+                buffer_marker: has(amd::buffer_marker::NAME)
+                    .then(|| amd::buffer_marker::Device::new(&instance.raw, &raw)),
                 dynamic_rendering: has(khr::dynamic_rendering::NAME)
                     .then(|| khr::dynamic_rendering::Device::new(&instance.raw, &raw)),
                 synchronization2: has(khr::synchronization2::NAME)
@@ -181,6 +186,7 @@ impl Device {
                 completed: AtomicU64::new(0),
                 open_recorders: AtomicU64::new(0),
                 is_lost: AtomicBool::new(false),
+                is_hung: AtomicBool::new(false),
                 next_id: AtomicU64::new(1),
                 allocator: Mutex::new(Some(allocator)),
                 graveyard: Mutex::default(),
@@ -389,6 +395,10 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
+        if self.is_hung.load(Ordering::Acquire) {
+            std::mem::forget((lock(&self.allocator).take(), self.instance.clone()));
+            return;
+        }
         // SAFETY: every object holds an Arc of the device, so only buried ones are left; the queue is drained first.
         unsafe {
             let _ = self.raw.device_wait_idle();

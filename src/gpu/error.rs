@@ -24,12 +24,12 @@ pub enum GpuError {
          or {allowed_layers} layers"
     )]
     ImageExtent { name: String, width: u32, height: u32, layers: u32, allowed: u32, allowed_layers: u32 },
-    #[error(
-        "the device was lost while running `{last_pass}`{fault}; the driver gave up on it: try a smaller --size or --elements, or another --gpu"
-    )]
+    #[error("the device was lost in `{last_pass}`{fault}; try a smaller --size or --elements, or another --gpu")]
     DeviceLost { last_pass: String, fault: String },
-    #[error("the device did not finish `{last_pass}` within {seconds} s")]
-    Timeout { last_pass: String, seconds: u64 },
+    #[error(
+        "the device did not finish `{last_pass}` within {seconds} s; raise --gpu-timeout, or try a smaller --size or --elements"
+    )]
+    Timeout { last_pass: String, seconds: f64 },
     /// Asked for something that cannot be, in whole words.
     #[error("{0}")]
     Refused(String),

@@ -2,7 +2,7 @@
 //!
 //! Required by *feature*, never by version number: under a frame debugger a device may call itself older than it is.
 
-use ash::{ext, khr, vk};
+use ash::{amd, ext, khr, vk};
 use std::collections::BTreeSet;
 use std::ffi::CStr;
 
@@ -17,6 +17,8 @@ pub struct OptionalFeatures {
     pub memory_budget: bool,
     pub calibrated_timestamps: bool,
     pub device_fault: bool,
+    /// Passes are marked one by one as they begin and end.
+    pub buffer_marker: bool,
     pub sampler_anisotropy: bool,
     /// Images can be shown in windows.
     pub swapchain: bool,
@@ -133,6 +135,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
             memory_budget: has(ext::memory_budget::NAME),
             calibrated_timestamps: has(ext::calibrated_timestamps::NAME),
             device_fault: f.device_fault.device_fault != 0,
+            buffer_marker: has(amd::buffer_marker::NAME),
             sampler_anisotropy: core.sampler_anisotropy != 0,
             swapchain: has(khr::swapchain::NAME),
         };
@@ -147,6 +150,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
         add(optional.memory_budget, &[ext::memory_budget::NAME]);
         add(optional.calibrated_timestamps, &[ext::calibrated_timestamps::NAME]);
         add(optional.device_fault, &[ext::device_fault::NAME]);
+        add(optional.buffer_marker, &[amd::buffer_marker::NAME]);
         add(optional.swapchain, &[khr::swapchain::NAME]);
         Support { missing, optional, extensions, graphics_queue_family }
     }

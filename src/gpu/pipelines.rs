@@ -372,6 +372,9 @@ impl Pipelines {
 
 impl Drop for Pipelines {
     fn drop(&mut self) {
+        if self.device.is_hung.load(Ordering::Acquire) {
+            return;
+        }
         if let Err(error) = self.save_cache() {
             tracing::debug!("pipeline cache not saved: {error}");
         }

@@ -14,6 +14,7 @@ use super::recorder::Recorder;
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// A window of any window system.
 pub trait WindowSource: HasDisplayHandle + HasWindowHandle {}
@@ -109,7 +110,9 @@ impl Presenter {
                 self.lose_surface(context);
                 Ok(false)
             }
-            Err(error) => Err(context.with_fault(GpuError::from_call("vkQueuePresentKHR", error, "window/present"))),
+            Err(error) => {
+                Err(context.found_lost(GpuError::from_call("vkQueuePresentKHR", error, "window/present"), &[], false))
+            }
         }
     }
 
@@ -191,7 +194,8 @@ impl Presenter {
                 Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => self.wants_new_swapchain = true,
                 Err(vk::Result::ERROR_SURFACE_LOST_KHR) => self.lose_surface(context),
                 Err(error) => {
-                    return Err(context.with_fault(GpuError::from_call("vkAcquireNextImageKHR", error, "window")));
+                    let error = GpuError::from_call("vkAcquireNextImageKHR", error, "window");
+                    return Err(context.found_lost(error, &[], false));
                 }
             }
         }
@@ -281,6 +285,9 @@ impl Presenter {
 
     /// The caller holds the queue.
     fn destroy_swapchain(&mut self) {
+        if self.device.is_hung.load(Ordering::Acquire) {
+            return;
+        }
         // SAFETY: the queue is idle, so nothing uses the swapchain's images and semaphores any more.
         unsafe {
             let _ = self.device.raw.queue_wait_idle(self.device.queue);
@@ -295,6 +302,9 @@ impl Presenter {
 impl Drop for Presenter {
     /// The last use of the queue: whoever else submitted has ended.
     fn drop(&mut self) {
+        if self.device.is_hung.load(Ordering::Acquire) {
+            return;
+        }
         self.destroy_swapchain();
         // SAFETY: the queue is idle and the swapchain gone.
         unsafe {

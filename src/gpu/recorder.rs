@@ -11,6 +11,7 @@ use super::pipelines::{Bound, RasterState, stage_flags};
 use super::profiler::Cost;
 use super::{Buffer, RawBuffer};
 use ash::vk;
+use std::cell::Cell;
 use std::fmt::Display;
 use std::sync::atomic::Ordering;
 
@@ -76,6 +77,8 @@ pub(super) struct Timed {
     pub cost: Cost,
     pub threads: u64,
     pub overlapped: bool,
+    /// Its number among all passes; see `loss`.
+    pub marker: u32,
     /// `None` for transfers, which no pipeline statistics count.
     pub is_compute: Option<bool>,
 }
@@ -89,12 +92,19 @@ pub struct Recorder<'c> {
     hazards: Hazards,
     pub(super) staging: Vec<RawBuffer>,
     pub(super) error: Option<GpuError>,
+    /// No pass was recorded since the last barrier.
+    pub(super) is_behind_barrier: Cell<bool>,
+    /// The device is lost here, on purpose: nothing more is recorded.
+    pub(super) is_lost_here: bool,
     pub(super) hashes: PendingHashes,
 }
 
 impl<'c> Recorder<'c> {
     pub(super) fn new(context: &'c Context, name: &str) -> Result<Self, GpuError> {
         let device = &context.device;
+        if context.is_lost() {
+            return Err(GpuError::DeviceLost { last_pass: name.to_owned(), fault: " (before it began)".into() });
+        }
         let slot = context.take_slot()?;
         device.open_recorders.fetch_add(1, Ordering::AcqRel);
         let recorder = Self {
@@ -105,6 +115,8 @@ impl<'c> Recorder<'c> {
             hazards: Hazards::default(),
             staging: Vec::new(),
             error: None,
+            is_behind_barrier: Cell::new(false),
+            is_lost_here: false,
             hashes: PendingHashes::default(),
         };
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
@@ -355,7 +367,7 @@ impl<'c> Recorder<'c> {
         is_compute: Option<bool>,
         body: impl FnOnce(&mut Self),
     ) {
-        if self.error.is_some() {
+        if self.error.is_some() || self.is_lost_here {
             return;
         }
         let needs_barrier = self.hazards.needs_barrier(accesses);
@@ -376,26 +388,32 @@ impl<'c> Recorder<'c> {
         let commands = slot.commands;
         let device = self.context.device.clone();
         device.begin_label(commands, name);
+        self.is_lost_here = self.is_lost_at(name);
+        let marker = self.mark_begun();
         // SAFETY: the queries were reset on the host when the slot was taken; begin and end pair up.
         unsafe {
             device.raw.cmd_write_timestamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, timestamps, 2 * query);
             if let Some(statistics) = statistics {
                 device.raw.cmd_begin_query(commands, statistics, query, vk::QueryControlFlags::empty());
             }
-            body(self);
+            if !self.is_lost_here {
+                body(self);
+            }
             if let Some(statistics) = statistics {
                 device.raw.cmd_end_query(commands, statistics, query);
             }
             device.raw.cmd_write_timestamp(commands, vk::PipelineStageFlags::BOTTOM_OF_PIPE, timestamps, 2 * query + 1);
         }
+        self.mark_ended(marker);
         device.end_label(commands);
         let overlapped = !(needs_barrier || self.context.options.full_barriers || self.timed.is_empty());
         let path = format!("{}/{name}", self.scopes.join("/"));
-        self.timed.push(Timed { path, name, cost, threads, overlapped, is_compute });
+        self.timed.push(Timed { path, name, cost, threads, overlapped, marker, is_compute });
     }
 
     /// Makes all that was written before visible to all that comes after.
-    fn barrier(&self) {
+    pub(super) fn barrier(&self) {
+        self.is_behind_barrier.set(true);
         let all = vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)

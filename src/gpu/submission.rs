@@ -40,6 +40,7 @@ impl Recorder<'_> {
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)
             .dst_stage_mask(vk::PipelineStageFlags2::HOST)
             .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+        self.mark_all_ended();
         let last_pass = self.timed.last().map_or_else(|| self.scopes.join("/"), |t| t.path.clone());
         // SAFETY: the command buffer is complete; queue access is exclusive by the lock.
         unsafe {
@@ -67,11 +68,12 @@ impl Recorder<'_> {
                     .raw
                     .queue_submit(device.queue, &[submit], vk::Fence::null())
                     .checked("vkQueueSubmit", &last_pass)
-                    .map_err(|e| self.context.with_fault(e))?;
+                    .map_err(|error| self.found_lost(error))?;
                 device.submitted.store(value, Ordering::Release);
                 value
             };
-            self.context.wait(value, &last_pass)?;
+            self.context.wait(value, &last_pass).map_err(|error| self.found_lost(error))?;
+            self.provoked().map_err(|error| self.found_lost(error))?;
         }
         self.collect(&last_pass)?;
         self.collect_hashes()?;

@@ -4,6 +4,7 @@
 //! bare `[Key]` stands in documentation, a last line `[Key]: crate::methods::PAPERS` makes it a link.
 
 pub mod antiradiance;
+pub mod carried;
 pub mod explicit_visibility;
 pub mod face_cluster;
 pub mod implicit_visibility;
@@ -34,6 +35,14 @@ pub struct Method {
     specs: fn() -> Vec<Spec>,
     record: fn(&[Assignment]) -> Recorded,
 }
+
+impl PartialEq for Method {
+    fn eq(&self, other: &Self) -> bool {
+        self.key == other.key
+    }
+}
+
+impl Eq for Method {}
 
 impl Method {
     const fn new<S: SettingGroup>(key: &'static str, paper: &'static Paper, summary: &'static str) -> Self {

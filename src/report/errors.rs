@@ -16,7 +16,7 @@
 //!
 //! [Andersson2020]: crate::methods::PAPERS
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde::Serialize;
 
 use super::image::{Encoding, Picture};
@@ -116,15 +116,10 @@ pub fn compare(
     let sum_squares: f64 = pixels().map(|(a, b)| (a - b).length_squared()).sum();
     let (sum_a, sum_b) = pixels().fold((0.0, 0.0), |(x, y), (a, b)| (x + a.element_sum(), y + b.element_sum()));
 
-    let epsilon = RELATIVE_EPSILON * (sum_b / sample_count).powi(2);
-    // A zero denominator is a black channel of a black picture: no error there counts as none, any as undefined.
-    let relative_square = |a: f64, b: f64| if a == b { 0.0 } else { (a - b).powi(2) / (b * b + epsilon) };
+    let mut relative = relative_squares(pixels(), sum_b / sample_count);
     let mut relative_map = vec![0.0f32; reference.rgb.len()];
-    let mut relative: Vec<f64> = Vec::with_capacity(indices.len());
-    for (&index, (a, b)) in indices.iter().zip(pixels()) {
-        let squares = (0..3).map(|c| relative_square(a[c], b[c])).sum::<f64>() / 3.0;
-        relative.push(squares);
-        relative_map[index] = if squares.is_finite() { squares.sqrt() as f32 } else { 0.0 };
+    for (&index, &squares) in indices.iter().zip(&relative) {
+        relative_map[index] = shown_error(squares);
     }
     let relative_mse = relative.iter().sum::<f64>() / indices.len() as f64;
     let p95 = percentile(&mut relative, 0.95).sqrt();
@@ -144,6 +139,28 @@ pub fn compare(
         flip_p95: percentile(&mut flip, 0.95),
     };
     Ok(Comparison { figures, flip_map, relative_map })
+}
+
+/// The relative MSE of two lists of as many pixels, and the error of each pixel as under
+/// [`ErrorFigures::relative_error_p95`]; `None` where it is undefined.
+pub fn relative_mse(picture: &[Vec3], reference: &[Vec3]) -> (Option<f64>, Vec<f32>) {
+    let pixels = picture.iter().zip(reference).map(|(a, b)| (a.as_dvec3(), b.as_dvec3()));
+    let mean = pixels.clone().map(|(_, b)| b.element_sum()).sum::<f64>() / (3 * reference.len().max(1)) as f64;
+    let squares = relative_squares(pixels, mean);
+    let figure = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    (figure.is_finite().then_some(figure), squares.into_iter().map(shown_error).collect())
+}
+
+/// Squared relative errors of pairs (picture, reference), means over channels; `mean` of the reference.
+fn relative_squares(pixels: impl Iterator<Item = (DVec3, DVec3)>, mean: f64) -> Vec<f64> {
+    let epsilon = RELATIVE_EPSILON * mean.powi(2);
+    // A zero denominator is a black channel of a black picture: no error there counts as none, any as undefined.
+    let relative_square = |a: f64, b: f64| if a == b { 0.0 } else { (a - b).powi(2) / (b * b + epsilon) };
+    pixels.map(|(a, b)| (0..3).map(|c| relative_square(a[c], b[c])).sum::<f64>() / 3.0).collect()
+}
+
+fn shown_error(squares: f64) -> f32 {
+    if squares.is_finite() { squares.sqrt() as f32 } else { 0.0 }
 }
 
 fn check_same_size(what: &'static str, picture: &Picture, reference: &Picture) -> Result<(), CompareError> {

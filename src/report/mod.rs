@@ -21,6 +21,7 @@
 pub mod bench_file;
 pub mod compare_page;
 pub mod errors;
+pub mod explanation;
 mod exr_file;
 pub mod heat_map;
 pub mod image;

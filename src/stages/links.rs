@@ -8,7 +8,7 @@ use super::scan::{self, ScanScratch};
 use crate::gpu::shaders::links as passes;
 use crate::gpu::shaders::types::{Hit, RowEntry};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
-use glam::UVec3;
+use glam::{UVec3, Vec3};
 use std::ops::Range;
 
 /// Elements that a packed link can name.
@@ -63,6 +63,19 @@ impl Link {
     pub fn from_packed(word: u32) -> Self {
         Self { sender: word / PACKED_UNITS, weight: (word % PACKED_UNITS) as f32 / PACKED_UNITS as f32 }
     }
+}
+
+/// As `decode_64` of `lib/shared_exponent.glsl`.
+fn from_shared_64(word: u64) -> Vec3 {
+    let (x, y) = (word as u32, (word >> 32) as u32);
+    let mantissas = [x >> 14, (x & 0x3fff) << 4 | y >> 28, y >> 10 & 0x3_ffff];
+    f32::from_bits((y & 0x3ff) << 23) * Vec3::from_array(mantissas.map(|m| m as f32))
+}
+
+/// As `decode_32`.
+fn from_shared_32(word: u32) -> Vec3 {
+    let mantissas = [word >> 24, word >> 16 & 0xff, word >> 8 & 0xff];
+    f32::from_bits((word & 0xff) << 23) * Vec3::from_array(mantissas.map(|m| m as f32))
 }
 
 /// The links of some consecutive receivers, a word each; some room may be left at the end.
@@ -149,6 +162,39 @@ impl Links {
             LinkWords::Packed(set) => set.windows.clear(),
         }
         self.link_count = 0;
+    }
+
+    /// The links of one receiver.
+    pub fn of_element(&self, context: &Context, element: u32) -> Result<Vec<Link>, GpuError> {
+        let at = element as usize;
+        let [first, last] = context.download_range(&self.offsets, at..at + 2)?[..] else { return Ok(Vec::new()) };
+        fn of_set<W: bytemuck::Pod>(
+            context: &Context,
+            set: &LinkSet<W>,
+            element: u32,
+            (first, last): (u32, u32),
+        ) -> Result<Vec<W>, GpuError> {
+            let has_it = |w: &&LinkWindow<W>| (w.first_element..w.first_element + w.element_count).contains(&element);
+            let Some(window) = set.windows.iter().find(has_it) else { return Ok(Vec::new()) };
+            let place = |link: u32| (link - window.first_link) as usize;
+            context.download_range(&window.words, place(first)..place(last))
+        }
+        Ok(match &self.words {
+            LinkWords::Full(set) => {
+                of_set(context, set, element, (first, last))?.into_iter().map(Link::from_word).collect()
+            }
+            LinkWords::Packed(set) => {
+                of_set(context, set, element, (first, last))?.into_iter().map(Link::from_packed).collect()
+            }
+        })
+    }
+
+    /// Radiosity of every sender as it was last sent along the links, W/m2.
+    pub fn sent(&self, context: &Context) -> Result<Vec<Vec3>, GpuError> {
+        Ok(match &self.words {
+            LinkWords::Full(set) => context.download(&set.sent)?.into_iter().map(from_shared_64).collect(),
+            LinkWords::Packed(set) => context.download(&set.sent)?.into_iter().map(from_shared_32).collect(),
+        })
     }
 
     /// All links, for tests and views; offsets into them are [`Self::offsets`].

@@ -4,10 +4,13 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::comparison::{Compared, OtherJob};
 use super::engine::{Depth, Engine, Picked, change};
 use crate::app::AppError;
 use crate::app::frame::SAMPLING_TASKS;
 use crate::app::render::RenderRequest;
+use crate::gpu::Context;
+use crate::report::explanation::Explanation;
 use crate::report::profile::SceneFacts;
 use crate::scene::camera::View;
 use crate::stages::film::Film;
@@ -61,6 +64,12 @@ pub struct News {
     pub failure: Option<String>,
     pub progress: Option<Progress>,
     pub is_working: bool,
+    /// The other picture of a comparison.
+    pub compared: Option<Compared>,
+    /// Another picture is being made, or made finer.
+    pub is_comparing: bool,
+    /// A pixel, explained.
+    pub explanation: Option<Explanation>,
     /// What was clicked at; the inner `None` is the background.
     pub picked: Option<Option<Picked>>,
     /// What a copy moves, bytes a millisecond, once it was asked for.
@@ -74,6 +83,8 @@ struct Papers {
     job: Option<Job>,
     /// A pixel that was clicked at.
     pick: Option<UVec2>,
+    explain: Option<UVec2>,
+    other: Option<OtherJob>,
     wants_bandwidth: bool,
     news: News,
     is_cancelled: bool,
@@ -84,7 +95,9 @@ struct Papers {
 enum Order {
     Picture(Box<Job>),
     Pick(UVec2),
+    Explain(UVec2),
     Bandwidth,
+    Other(Box<OtherJob>),
 }
 
 /// Shared by the two threads.
@@ -117,6 +130,22 @@ impl Desk {
         self.wake.notify_all();
     }
 
+    /// Asks what makes up a pixel of the last picture.
+    pub fn explain(&self, pixel: UVec2) {
+        self.lock().explain = Some(pixel);
+        self.wake.notify_all();
+    }
+
+    /// Asks for another picture to compare the picture with, or for none.
+    pub fn compare(&self, other: Option<OtherJob>) {
+        let mut papers = self.lock();
+        papers.news.is_comparing = other.is_some();
+        papers.news.compared = None;
+        papers.other = other;
+        drop(papers);
+        self.wake.notify_all();
+    }
+
     /// Asks what a copy moves on this device.
     pub fn measure_bandwidth(&self) {
         self.lock().wants_bandwidth = true;
@@ -145,6 +174,9 @@ impl Desk {
             failure: news.failure.clone(),
             progress: news.progress.clone(),
             is_working: news.is_working,
+            compared: news.compared.take(),
+            is_comparing: news.is_comparing,
+            explanation: news.explanation.take(),
             picked: news.picked.take(),
             bandwidth: news.bandwidth.take(),
             end: news.end.take(),
@@ -159,11 +191,26 @@ impl Desk {
 
     /// Renders what is asked for until closed.
     pub fn work(&self, mut engine: Engine<'_>) {
+        let mut bench = Bench { context: engine.context(), other: None, request: None, film: None, compared: None };
         while let Some(order) = self.next() {
             let job = match order {
                 Order::Picture(job) => *job,
+                Order::Explain(pixel) => {
+                    let watch = PlainWatch(self);
+                    let Some(request) = &bench.request else { continue };
+                    let result = engine.explain(request, pixel, &watch);
+                    self.answer(result, engine.is_lost(), |news, found| news.explanation = Some(found));
+                    continue;
+                }
+                Order::Other(job) => {
+                    self.compare_once(*job, &mut engine, &mut bench);
+                    continue;
+                }
                 Order::Pick(pixel) => {
-                    self.answer(engine.pick(pixel), engine.is_lost(), |news, picked| news.picked = Some(picked));
+                    let Some(request) = &bench.request else { continue };
+                    self.answer(engine.pick(request, pixel), engine.is_lost(), |news, picked| {
+                        news.picked = Some(picked)
+                    });
                     continue;
                 }
                 Order::Bandwidth => {
@@ -183,6 +230,8 @@ impl Desk {
             papers.news.is_working = papers.job.is_some();
             match (result, engine.stage()) {
                 (Ok(film), Some(stage)) => {
+                    bench.film = (!job.is_preview).then(|| Arc::clone(&film));
+                    bench.request = Some(job.request.clone());
                     papers.news.shown = Some(Shown {
                         film,
                         view: stage.view,
@@ -204,6 +253,37 @@ impl Desk {
             drop(papers);
             (self.tell)();
         }
+    }
+
+    /// One step of another picture; what is left of it is asked for again, unless something newer was.
+    fn compare_once(&self, job: OtherJob, engine: &mut Engine<'_>, bench: &mut Bench<'_>) {
+        let Some(film) = bench.film.clone() else { return };
+        let context = bench.context;
+        let other = bench.other.get_or_insert_with(|| Engine::new(context));
+        let watch = PlainWatch(self);
+        let before = bench.compared.as_ref().filter(|compared| change(&compared.own, &job.own).is_none());
+        let result = job.clone().work(context, (engine, other), &film, before, &watch);
+        let mut papers = self.lock();
+        match result {
+            Ok((compared, rest)) => {
+                bench.compared = compared.or(bench.compared.take());
+                // Unless another comparison was asked for meanwhile.
+                if papers.other.is_none() && papers.news.is_comparing {
+                    papers.news.compared.clone_from(&bench.compared);
+                    papers.news.is_comparing = rest.is_some();
+                    papers.other = rest;
+                }
+            }
+            Err(error) if context.is_lost() => papers.news.end = Some(error),
+            Err(error) if is_interruption(&error) => {
+                if papers.other.is_none() && papers.news.is_comparing && !papers.is_cancelled {
+                    papers.other = Some(job);
+                }
+            }
+            Err(error) => papers.news.failure = Some(error.to_string()),
+        }
+        drop(papers);
+        (self.tell)();
     }
 
     /// Puts what a small order brought, or its error, into the news.
@@ -230,16 +310,27 @@ impl Desk {
             if let Some(pixel) = papers.pick.take() {
                 return Some(Order::Pick(pixel));
             }
+            if let Some(pixel) = papers.explain.take() {
+                return Some(Order::Explain(pixel));
+            }
             if std::mem::take(&mut papers.wants_bandwidth) {
                 return Some(Order::Bandwidth);
+            }
+            if let Some(job) = papers.other.take() {
+                return Some(Order::Other(Box::new(job)));
             }
             papers = self.wake.wait(papers).unwrap_or_else(PoisonError::into_inner);
         }
     }
 
     fn lock(&self) -> MutexGuard<'_, Papers> {
-        self.papers.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.papers)
     }
+}
+
+/// Locks, going on after a panic elsewhere: what is guarded is whole between statements.
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Methods wrap the interruption in errors of their own.
@@ -255,6 +346,31 @@ fn is_interruption(error: &AppError) -> bool {
         cause = error.source();
     }
     false
+}
+
+/// What the renderer keeps of a comparison.
+struct Bench<'c> {
+    context: &'c Context,
+    other: Option<Engine<'c>>,
+    /// Of the last picture.
+    request: Option<RenderRequest>,
+    /// The picture, in full quality.
+    film: Option<Arc<Film>>,
+    compared: Option<Compared>,
+}
+
+/// Ends work that anything else is more urgent than.
+struct PlainWatch<'d>(&'d Desk);
+
+impl Watch for PlainWatch<'_> {
+    fn step(&self, task: &str, done: u64, total: u64) -> Result<(), Interrupted> {
+        let mut papers = self.0.lock();
+        if papers.is_closing || papers.is_cancelled || papers.job.is_some() {
+            return Err(Interrupted);
+        }
+        papers.news.progress = Some(Progress { task: task.to_owned(), done, total });
+        Ok(())
+    }
 }
 
 struct DeskWatch<'d> {

@@ -6,11 +6,13 @@ use std::sync::Arc;
 use crate::app::AppError;
 use crate::app::bench::yardsticks::Yardsticks;
 use crate::app::edits::{Edit, Originals};
+use crate::app::explain;
 use crate::app::frame::Method;
 use crate::app::render::RenderRequest;
 use crate::app::stage::{Stage, load_scene};
 use crate::gpu::Context;
 use crate::methods::pick::seen_triangle;
+use crate::report::explanation::Explanation;
 use crate::report::trace::TimeLine;
 use crate::scene::pose::PosedLight;
 use crate::scene::{LightKind, Material, Scene};
@@ -142,6 +144,26 @@ impl<'c> Engine<'c> {
         }
     }
 
+    pub fn context(&self) -> &'c Context {
+        self.context
+    }
+
+    /// What makes up a pixel of the picture of `request`, which is rendered again for it.
+    pub fn explain(
+        &mut self,
+        request: &RenderRequest,
+        pixel: UVec2,
+        watch: &dyn Watch,
+    ) -> Result<Explanation, AppError> {
+        explain::check(request, pixel)?;
+        let film = self.render(request, watch)?;
+        let (Some(stage), Some(method)) = (&self.stage, &mut self.method) else {
+            return Err(AppError::failed("there is no picture yet"));
+        };
+        let frame = explain::Frame { context: self.context, request, stage, film: &film, watch };
+        explain::explain(frame, method, pixel)
+    }
+
     pub fn is_lost(&self) -> bool {
         self.context.is_lost()
     }
@@ -218,9 +240,10 @@ impl<'c> Engine<'c> {
         self.owed = self.owed.max(Depth::Method);
     }
 
-    /// What the pixel of the last frame shows: a light close by, else the nearest surface.
-    pub fn pick(&self, pixel: UVec2) -> Result<Option<Picked>, AppError> {
-        let (Some(stage), Some(request)) = (&self.stage, &self.last) else { return Ok(None) };
+    /// What a pixel of the picture of `request` shows: a light close by, else the nearest surface.
+    pub fn pick(&mut self, request: &RenderRequest, pixel: UVec2) -> Result<Option<Picked>, AppError> {
+        let Some(stage) = &mut self.stage else { return Ok(None) };
+        stage.look(request)?;
         let size = UVec2::new(request.width, request.height);
         let near_pixel = |light: &&PosedLight| {
             let at = stage.view.project(light.position, size);

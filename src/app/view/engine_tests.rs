@@ -104,7 +104,7 @@ fn a_click_finds_what_the_pixel_shows() {
     let film = engine.render(&request(""), &Unwatched).unwrap();
     let depth = context.download(&film.depth).unwrap();
     // Lights are caught within some pixels of theirs; the office has few.
-    let pick = |i: u32| match engine.pick(UVec2::new(i % 30, i / 30)).unwrap() {
+    let pick = |i: u32| match engine.pick(&request(""), UVec2::new(i % 30, i / 30)).unwrap() {
         Some(Picked::Surface(surface)) => Some((UVec2::new(i % 30, i / 30), surface)),
         _ => None,
     };

@@ -6,6 +6,8 @@
 //! | [`desk`] | between the window's thread and the one that renders |
 //! | [`window`] | the window: events in, frames out |
 //! | [`viewer`] | what the user did: the state that decides the picture |
+//! | [`comparison`] | another method or the reference beside the picture |
+//! | [`input`] | keys and the mouse over the picture |
 //! | [`panel`] | the panel beside the picture |
 //! | [`settings`] | a widget for every setting, from its declaration |
 //! | [`editor`] | materials, lights and places, changed |
@@ -15,22 +17,26 @@
 //! The window's thread only ever draws the last film and the interface, so link generation never stops it.
 
 mod camera;
+mod comparison;
 mod desk;
 mod editor;
 mod engine;
+mod input;
 mod panel;
 mod profiler;
 mod settings;
 mod viewer;
 mod window;
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 
+use serde_json::Map;
 use winit::event_loop::EventLoop;
 
 use super::AppError;
 use super::cli::{Global, ViewArgs};
-use super::render::{check_validation, pipeline_cache};
+use super::crash;
+use super::render::{check_validation, device_options};
 use crate::gpu::{Context, Options, ShaderWatcher};
 use desk::Desk;
 use engine::Engine;
@@ -50,20 +56,21 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     if !args.shots.is_dir() {
         return Err(AppError::Usage(format!("--shots {} is no folder; make it first", args.shots.display())));
     }
-    let viewer = Viewer::new(args)?;
+    // The options of the last picture that was asked for.
+    let asked = Arc::new(Mutex::new(String::new()));
+    let viewer = Viewer::new(args, asked.clone())?;
     let shaders = args.shaders.as_deref().map(ShaderWatcher::new).transpose().map_err(AppError::Usage)?;
     let no_window = |error: winit::error::EventLoopError| {
         AppError::failed(format!("no window can be opened ({error}); `linklight render` needs none"))
     };
     let event_loop = EventLoop::<()>::with_user_event().build().map_err(no_window)?;
     let proxy = event_loop.create_proxy();
+    let command = move || format!("linklight render {} -o again.png", desk::lock(&asked));
     let options = Options {
-        gpu: global.gpu.clone(),
-        validation: global.validate,
         presents: true,
         statistics: true,
-        pipeline_cache: pipeline_cache(),
-        ..Options::default()
+        on_loss: Some(crash::hook(global, Map::new(), command)),
+        ..device_options(global)
     };
     let context = Context::new(options)?;
     let info = context.info();

@@ -25,6 +25,9 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         ui.separator();
         light(ui, viewer);
         ui.separator();
+        viewer.comparison.rows(ui);
+        ui.checkbox(&mut viewer.explains, "clicks explain a pixel").on_hover_text("X");
+        ui.separator();
         camera(ui, viewer);
         animation(ui, viewer);
         ui.separator();

@@ -2,34 +2,33 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use egui::{CentralPanel, Key, PointerButton, Sense, Ui};
-use glam::{UVec2, Vec2, Vec3};
+use egui::{CentralPanel, Ui};
 
 use super::camera::{self, CameraMode};
-use super::desk::{Desk, Job, News, Shown};
+use super::comparison::{Compared, Comparison, Layout, OtherJob};
+use super::desk::{self, Desk, Job, News, Shown};
 use super::engine::{Picked, change};
 use super::panel;
 use super::profiler::Profiler;
 use crate::app::cli::{Display, PictureArgs, ViewArgs};
 use crate::app::render::{FreeCamera, RenderRequest};
 use crate::app::values::{Format, Output};
-use crate::app::{AppError, frame, output, state, views};
+use crate::app::{AppError, crash, frame, output, state, views};
 use crate::display::tone_map::LightParts;
 use crate::gpu::{Context, MemoryUse, PassRecord, Reload};
+use crate::methods::Method;
 use crate::methods::settings::Assignment;
-use crate::methods::{METHODS, Method};
-use crate::report::image::{MAX_PIXELS, MAX_SIDE};
-use crate::report::tonemap::ToneSettings;
+use crate::report::explanation::Explanation;
+use crate::report::tonemap::{Operator, ToneSettings};
 use crate::stages::film::Film;
 
 /// Width of the panel, points.
 pub const PANEL_WIDTH: f32 = 300.0;
 /// Longest step of time between two frames, so that a hitch makes no leap.
 const LONGEST_STEP: Duration = Duration::from_millis(200);
-/// Seconds a step of the animation takes, by key.
-const ANIMATION_STEP: f32 = 1.0 / 30.0;
 
 /// The state of the viewer.
 pub struct Viewer {
@@ -50,6 +49,12 @@ pub struct Viewer {
     pub wants_new_surface: bool,
     /// What was clicked at.
     pub picked: Option<Picked>,
+    /// What the picture is compared with, and the outcome.
+    pub comparison: Comparison,
+    pub compared: Option<Compared>,
+    /// Clicks explain pixels.
+    pub explains: bool,
+    pub(super) explanation: Option<Explanation>,
     pub memory: BTreeMap<String, MemoryUse>,
     profiler: Profiler,
     shows_profile: bool,
@@ -57,14 +62,17 @@ pub struct Viewer {
     shader_errors: BTreeMap<&'static str, String>,
     /// A shader changed: the next picture is prepared anew.
     is_anew: bool,
-    is_bare: bool,
+    pub(super) is_bare: bool,
     /// The mouse or a key moves the camera.
-    is_steering: bool,
+    pub(super) is_steering: bool,
     /// Options and kind of the picture that was asked for.
     posted: Option<(Vec<String>, bool)>,
     asked: Option<Job>,
+    /// Options of both pictures of the comparison that was asked for.
+    asked_other: Option<(Vec<String>, &'static str)>,
+    asked_words: Arc<Mutex<String>>,
     /// Of the picture's top left pixel in the frame.
-    corner: [u32; 2],
+    pub(super) corner: [u32; 2],
     shots: PathBuf,
     last_tick: Instant,
     frame_count: u64,
@@ -81,7 +89,8 @@ pub struct PictureShown<'v> {
 }
 
 impl Viewer {
-    pub fn new(args: &ViewArgs) -> Result<Self, AppError> {
+    /// `asked` always holds the options of the last picture that was asked for, as `linklight render` takes them.
+    pub fn new(args: &ViewArgs, asked: Arc<Mutex<String>>) -> Result<Self, AppError> {
         request(&args.picture)?;
         let mut picture = args.picture.clone();
         // The widgets know the setting.
@@ -99,6 +108,14 @@ impl Viewer {
             wants_to_quit: false,
             wants_new_surface: false,
             picked: None,
+            comparison: Comparison {
+                against: args.against,
+                layout: if args.difference { Layout::Difference } else { Layout::SideBySide },
+            },
+            compared: None,
+            explains: false,
+            explanation: None,
+            asked_other: None,
             memory: BTreeMap::new(),
             profiler: Profiler::default(),
             shows_profile: false,
@@ -108,6 +125,7 @@ impl Viewer {
             is_steering: false,
             posted: None,
             asked: None,
+            asked_words: asked,
             corner: [0; 2],
             shots: args.shots.clone(),
             last_tick: Instant::now(),
@@ -119,14 +137,22 @@ impl Viewer {
     /// So that the picture has the size that was asked for, pixels.
     pub fn window_size(&self) -> [u32; 2] {
         let (width, height) = self.args.size;
+        let width = if self.comparison.is_side_by_side() { 2 * width } else { width };
         [width + if self.is_bare { 0 } else { PANEL_WIDTH as u32 }, height]
     }
 
     pub fn title(&self) -> String {
         let doing = match () {
             () if self.complaint.is_some() || self.news.failure.is_some() => "no picture",
-            () if self.is_settled() => "ready",
-            () => "working",
+            () if !self.is_settled() => "working",
+            () => match (&self.compared, self.comparison.against) {
+                (Some(Compared { relative_mse: Some(figure), spp, .. }), Some(against)) => {
+                    let what = format!("relative MSE {figure:.4} to {} of {spp}", against.key);
+                    return format!("linklight: {} by {} (ready, {what})", self.args.scene, self.args.method.key);
+                }
+                (None, Some(_)) => "comparing",
+                _ => "ready",
+            },
         };
         format!("linklight: {} by {} ({doing})", self.args.scene, self.args.method.key)
     }
@@ -144,6 +170,12 @@ impl Viewer {
         if let Some(shown) = self.news.shown.take() {
             self.profiler.finish_frame(shown.milliseconds);
             self.shown = Some(shown);
+        }
+        if let Some(compared) = self.news.compared.take() {
+            self.compared = Some(compared);
+        }
+        if let Some(explanation) = self.news.explanation.take() {
+            self.explanation = Some(explanation);
         }
         if let Some(picked) = self.news.picked.take() {
             self.picked = picked;
@@ -181,12 +213,22 @@ impl Viewer {
         self.frame_count += 1;
     }
 
-    /// The last film, to be shown as the options say now.
-    pub fn picture(&self) -> Option<PictureShown<'_>> {
-        let shown = self.shown.as_ref()?;
+    /// The last films, to be shown as the options say now.
+    pub fn pictures(&self) -> Vec<PictureShown<'_>> {
+        let Some(shown) = &self.shown else { return Vec::new() };
         let request = request(&self.args).ok();
         let request = request.as_ref().unwrap_or(&shown.job.request);
-        Some(PictureShown { film: &shown.film, corner: self.corner, parts: request.light, tone: request.tone })
+        let (corner, parts, tone) = (self.corner, request.light, request.tone);
+        let own = PictureShown { film: &shown.film, corner, parts, tone };
+        let Some(compared) = self.compared.as_ref().filter(|_| self.comparison.against.is_some()) else {
+            return vec![own];
+        };
+        if self.comparison.is_side_by_side() {
+            let [x, y] = corner;
+            return vec![own, PictureShown { film: &compared.film, corner: [x + self.args.size.0, y], parts, tone }];
+        }
+        let plain = ToneSettings { operator: Operator::None, exposure: 0.0, ..tone };
+        vec![PictureShown { film: &compared.difference, corner, parts: LightParts::All, tone: plain }]
     }
 
     /// Lays the interface out, lets it change the options, and asks for the picture they decide.
@@ -206,6 +248,10 @@ impl Viewer {
             let window = egui::Window::new("Profile").default_width(560.0).default_pos([PANEL_WIDTH + 20.0, 20.0]);
             window.show(ui.ctx(), |ui| self.profiler.show(ui, &self.memory));
         }
+        if self.comparison.against.is_some() {
+            self.show_comparison(ui);
+        }
+        self.show_explanation(ui);
         if !self.shader_errors.is_empty() {
             egui::Window::new("Shaders kept as they were").default_pos([PANEL_WIDTH + 20.0, 40.0]).show(
                 ui.ctx(),
@@ -220,6 +266,7 @@ impl Viewer {
             let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
             self.step_animation(step, duration);
         }
+        self.ask_other(desk);
         let holds = ui.ctx().input(|input| input.pointer.any_down()) && !self.is_steering;
         if !holds {
             self.ask(desk);
@@ -291,112 +338,6 @@ impl Viewer {
         is_final && request(&self.args).is_ok_and(is_current)
     }
 
-    fn keys(&mut self, ui: &Ui, desk: &Desk, step: f32) {
-        // With the modifiers of the moment it was pressed: all may be released again within one slow frame.
-        let pressed_with = |wanted: Key, with_command: bool| {
-            let is_it = |event: &egui::Event| {
-                matches!(event, egui::Event::Key { key, pressed: true, modifiers, .. }
-                    if *key == wanted && modifiers.command == with_command)
-            };
-            ui.ctx().input(|input| input.events.iter().any(is_it))
-        };
-        let pressed = |key| pressed_with(key, false);
-        let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
-        if pressed(Key::F1) {
-            self.is_bare = !self.is_bare;
-        }
-        if pressed(Key::F12) {
-            self.wants_screenshot = true;
-        }
-        if pressed(Key::F5) {
-            self.wants_state = true;
-        }
-        if pressed(Key::R) {
-            self.ask_again();
-        }
-        if pressed(Key::P) {
-            self.toggle_profile(desk);
-        }
-        if pressed(Key::Escape) {
-            desk.cancel();
-        }
-        if pressed(Key::Space) {
-            self.is_playing = !self.is_playing && duration > 0.0;
-        }
-        self.wants_to_quit |= pressed_with(Key::Q, true);
-        self.wants_new_surface |= pressed_with(Key::L, true);
-        for (key, other) in [(Key::PageDown, 1), (Key::PageUp, METHODS.len() - 1)] {
-            if pressed(key) {
-                let at = METHODS.iter().position(|method| method.key == self.args.method.key).unwrap_or(0);
-                self.choose_method(&METHODS[(at + other) % METHODS.len()]);
-            }
-        }
-        for (key, seconds) in [(Key::Comma, -ANIMATION_STEP), (Key::Period, ANIMATION_STEP)] {
-            if pressed(key) {
-                self.step_animation(seconds, duration);
-            }
-        }
-        if pressed(Key::C) {
-            self.camera_mode = match self.camera_mode {
-                CameraMode::Orbit => CameraMode::Fly,
-                CameraMode::Fly => CameraMode::Orbit,
-            };
-        }
-        if self.camera_mode == CameraMode::Fly {
-            let down = |key| f32::from(u8::from(ui.ctx().input(|input| input.key_down(key))));
-            let way = Vec3::new(down(Key::D) - down(Key::A), down(Key::E) - down(Key::Q), down(Key::W) - down(Key::S));
-            if let (true, Some(shown)) = (way != Vec3::ZERO, &self.shown) {
-                let size = (shown.bounds[1] - shown.bounds[0]).length();
-                self.move_camera(|camera| camera::fly(camera, way * (0.25 * size * step)));
-            }
-        }
-    }
-
-    /// The picture's place, and the mouse over it.
-    fn steer(&mut self, ui: &mut Ui, desk: &Desk) {
-        let rect = ui.max_rect();
-        let scale = ui.ctx().pixels_per_point();
-        let pixels = |points: f32| (points * scale).round().max(0.0) as u32;
-        self.corner = [pixels(rect.min.x), pixels(rect.min.y)];
-        let size = [pixels(rect.max.x), pixels(rect.max.y)].map(|side| side.min(MAX_SIDE));
-        let (width, height) = (size[0].saturating_sub(self.corner[0]), size[1].saturating_sub(self.corner[1]));
-        if width > 0 && height > 0 && u64::from(width) * u64::from(height) <= MAX_PIXELS {
-            self.args.size = (width, height);
-        }
-
-        let response = ui.interact(rect, ui.id().with("picture"), Sense::click_and_drag());
-        let dragged = response.drag_delta() * scale;
-        let dragged = Vec2::new(dragged.x, dragged.y);
-        let notches =
-            if response.hovered() { ui.ctx().input(|input| input.smooth_scroll_delta().y) / 50.0 } else { 0.0 };
-        let (mode, rows) = (self.camera_mode, height as f32);
-        if response.dragged() {
-            self.is_steering = true;
-        }
-        if let (true, Some(at)) = (response.clicked(), response.interact_pointer_pos()) {
-            let [left, top] = self.corner;
-            desk.pick(UVec2::new(pixels(at.x).saturating_sub(left), pixels(at.y).saturating_sub(top)));
-        }
-        if response.dragged_by(PointerButton::Primary) && dragged != Vec2::ZERO {
-            self.move_camera(|camera| camera::turn(camera, mode, dragged));
-        } else if response.dragged() && dragged != Vec2::ZERO {
-            self.move_camera(|camera| camera::pan(camera, dragged, rows));
-        }
-        if notches != 0.0 {
-            self.move_camera(|camera| camera::dolly(camera, notches));
-        }
-    }
-
-    fn move_camera(&mut self, change: impl FnOnce(&mut FreeCamera)) {
-        let Some(mut camera) = self.free_camera() else { return };
-        change(&mut camera);
-        let FreeCamera { eye, look_at, fov } = camera;
-        if eye.is_finite() && look_at.is_finite() && eye != look_at && eye.abs().max_element() < 1e9 {
-            (self.args.eye, self.args.look_at, self.args.fov) = (Some(eye), Some(look_at), fov);
-            self.is_steering = true;
-        }
-    }
-
     /// Asks for the picture that the options decide, unless it was asked for.
     fn ask(&mut self, desk: &Desk) {
         let is_preview = self.is_moving();
@@ -405,6 +346,9 @@ impl Viewer {
             return;
         }
         self.posted = Some(posted);
+        self.compared = None;
+        self.asked_other = None;
+        desk.compare(None);
         match request(&self.args) {
             Ok(mut request) => {
                 self.complaint = None;
@@ -415,6 +359,9 @@ impl Viewer {
                 if !self.asked.as_ref().is_some_and(same) {
                     let job = Job { request, is_preview, is_anew: std::mem::take(&mut self.is_anew) };
                     self.asked = Some(job.clone());
+                    let words: Vec<String> =
+                        state::options(&self.args).iter().map(|word| crash::quoted(word)).collect();
+                    *desk::lock(&self.asked_words) = words.join(" ");
                     self.news.is_working = true;
                     desk.ask(job);
                 }
@@ -423,6 +370,55 @@ impl Viewer {
                 let text = error.to_string();
                 self.complaint = Some(text.split("\n\n").next().unwrap_or_default().to_owned());
             }
+        }
+    }
+
+    /// Asks for the other picture of the comparison once the picture stands.
+    fn ask_other(&mut self, desk: &Desk) {
+        let wanted = self.comparison.against.map(|against| (state::options(&self.args), against.key));
+        if wanted.is_some() && !self.is_settled() || self.asked_other == wanted {
+            return;
+        }
+        self.asked_other = wanted;
+        self.compared = None;
+        let Some(against) = self.comparison.against else { return desk.compare(None) };
+        let (display, set) = self.left.get(against.key).cloned().unwrap_or_default();
+        let other = PictureArgs { method: against, display, set, spp: None, view: None, ..self.args.clone() };
+        match (request(&self.args), request(&other)) {
+            (Ok(own), Ok(other)) => desk.compare(Some(OtherJob::new(own, other))),
+            (Err(error), _) | (_, Err(error)) => self.complaint = Some(error.to_string()),
+        }
+    }
+
+    fn show_comparison(&self, ui: &Ui) {
+        let corner = [self.corner[0] as f32 + 10.0, self.corner[1] as f32 + 10.0];
+        egui::Window::new("Comparison").default_pos(corner).resizable(false).show(ui.ctx(), |ui| {
+            match &self.compared {
+                Some(compared) => compared.rows(ui),
+                None => drop(ui.label("waiting for the other picture")),
+            }
+            if self.news.is_comparing {
+                ui.weak("going on");
+            }
+        });
+    }
+
+    fn show_explanation(&mut self, ui: &Ui) {
+        let mut is_open = self.explanation.is_some();
+        if let Some(explanation) = &self.explanation {
+            let window = egui::Window::new("What makes up the pixel").default_width(640.0).open(&mut is_open);
+            window.default_pos([PANEL_WIDTH + 20.0, 60.0]).show(ui.ctx(), |ui| {
+                egui::ScrollArea::both().max_height(360.0).show(ui, |ui| {
+                    ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
+                    ui.monospace(explanation.to_text());
+                    if let Err(mismatch) = explanation.check() {
+                        ui.colored_label(egui::Color32::LIGHT_RED, mismatch.to_string());
+                    }
+                });
+            });
+        }
+        if !is_open {
+            self.explanation = None;
         }
     }
 

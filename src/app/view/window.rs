@@ -105,7 +105,7 @@ impl<'c> ViewWindow<'c> {
 
         let mut recorder = self.context.recorder("window")?;
         recorder.clear_image(&open.frame, BACKGROUND);
-        if let Some(picture) = self.viewer.picture() {
+        for picture in self.viewer.pictures() {
             if open.tone_mapping.pixels() < picture.film.pixel_count() {
                 open.tone_mapping = ToneMapping::new(self.context, picture.film.pixel_count())?;
             }

@@ -51,7 +51,7 @@ pub use report::Report;
 pub use scheme::{Residual, growth_rate};
 pub use settings::{Backs, Scheme, Settings};
 pub use tables::{LocalStep, Tables, binned};
-pub use views::DebugView;
+pub use views::{DebugView, half};
 
 pub use super::explicit_visibility::Stage;
 use crate::gpu::shaders::methods::antiradiance as passes;

@@ -148,7 +148,7 @@ fn entry(words: &[u64]) -> Vec3 {
 }
 
 /// An f16 by its bits.
-fn half(bits: u16) -> f32 {
+pub fn half(bits: u16) -> f32 {
     let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f32::from(bits & 0x3ff) / 1024.0);
     let magnitude = match exponent {
         0 => fraction * 2f32.powi(-14),

@@ -29,6 +29,7 @@
 //!
 //! [Schmitz2008]: crate::methods::PAPERS
 
+mod carried;
 mod linking;
 mod ray_count;
 mod report;

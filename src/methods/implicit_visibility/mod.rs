@@ -28,6 +28,7 @@
 //! [Dong2007]: crate::methods::PAPERS
 
 pub mod bins;
+mod carried;
 mod gloss;
 mod linking;
 mod report;

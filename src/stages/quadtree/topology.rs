@@ -107,6 +107,15 @@ impl QuadtreeTopology {
         segment.child_first + first.min(segment.child_count)..segment.child_first + (first + 4).min(segment.child_count)
     }
 
+    /// Leaves of the subtree of `node`.
+    pub fn leaves_below(&self, node: u32) -> Range<u32> {
+        let mut nodes = node..node + 1;
+        while !self.children(nodes.start).is_empty() {
+            nodes = self.children(nodes.start).start..self.children(nodes.end - 1).end;
+        }
+        nodes
+    }
+
     pub fn segment(&self, node: u32) -> &QuadtreeSegment {
         &self.segments[self.node_segments[node as usize] as usize]
     }

@@ -1,0 +1,136 @@
+//! What keys and the mouse do over the picture.
+
+use egui::{Key, PointerButton, Sense, Ui};
+use glam::{UVec2, Vec2, Vec3};
+
+use super::camera::{self, CameraMode};
+use super::desk::Desk;
+use super::viewer::Viewer;
+use crate::app::render::FreeCamera;
+use crate::methods::METHODS;
+use crate::report::image::{MAX_PIXELS, MAX_SIDE};
+
+/// Seconds a step of the animation takes, by key.
+const ANIMATION_STEP: f32 = 1.0 / 30.0;
+
+impl Viewer {
+    pub(super) fn keys(&mut self, ui: &Ui, desk: &Desk, step: f32) {
+        // With the modifiers of the moment it was pressed: all may be released again within one slow frame.
+        let pressed_with = |wanted: Key, with_command: bool| {
+            let is_it = |event: &egui::Event| {
+                matches!(event, egui::Event::Key { key, pressed: true, modifiers, .. }
+                    if *key == wanted && modifiers.command == with_command)
+            };
+            ui.ctx().input(|input| input.events.iter().any(is_it))
+        };
+        let pressed = |key| pressed_with(key, false);
+        let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
+        if pressed(Key::F1) {
+            self.is_bare = !self.is_bare;
+        }
+        if pressed(Key::F12) {
+            self.wants_screenshot = true;
+        }
+        if pressed(Key::F5) {
+            self.wants_state = true;
+        }
+        if pressed(Key::R) {
+            self.ask_again();
+        }
+        if pressed(Key::P) {
+            self.toggle_profile(desk);
+        }
+        if pressed(Key::X) {
+            self.explains = !self.explains;
+        }
+        if pressed(Key::Escape) {
+            desk.cancel();
+            self.explanation = None;
+        }
+        if pressed(Key::Space) {
+            self.is_playing = !self.is_playing && duration > 0.0;
+        }
+        self.wants_to_quit |= pressed_with(Key::Q, true);
+        self.wants_new_surface |= pressed_with(Key::L, true);
+        for (key, other) in [(Key::PageDown, 1), (Key::PageUp, METHODS.len() - 1)] {
+            if pressed(key) {
+                let at = METHODS.iter().position(|method| method.key == self.args.method.key).unwrap_or(0);
+                self.choose_method(&METHODS[(at + other) % METHODS.len()]);
+            }
+        }
+        for (key, seconds) in [(Key::Comma, -ANIMATION_STEP), (Key::Period, ANIMATION_STEP)] {
+            if pressed(key) {
+                self.step_animation(seconds, duration);
+            }
+        }
+        if pressed(Key::C) {
+            self.camera_mode = match self.camera_mode {
+                CameraMode::Orbit => CameraMode::Fly,
+                CameraMode::Fly => CameraMode::Orbit,
+            };
+        }
+        if self.camera_mode == CameraMode::Fly {
+            let down = |key| f32::from(u8::from(ui.ctx().input(|input| input.key_down(key))));
+            let way = Vec3::new(down(Key::D) - down(Key::A), down(Key::E) - down(Key::Q), down(Key::W) - down(Key::S));
+            if let (true, Some(shown)) = (way != Vec3::ZERO, &self.shown) {
+                let size = (shown.bounds[1] - shown.bounds[0]).length();
+                self.move_camera(|camera| camera::fly(camera, way * (0.25 * size * step)));
+            }
+        }
+    }
+
+    /// The picture's place, and the mouse over it.
+    pub(super) fn steer(&mut self, ui: &mut Ui, desk: &Desk) {
+        let rect = ui.max_rect();
+        let scale = ui.ctx().pixels_per_point();
+        let pixels = |points: f32| (points * scale).round().max(0.0) as u32;
+        self.corner = [pixels(rect.min.x), pixels(rect.min.y)];
+        let size = [pixels(rect.max.x), pixels(rect.max.y)].map(|side| side.min(MAX_SIDE));
+        let (width, height) = (size[0].saturating_sub(self.corner[0]), size[1].saturating_sub(self.corner[1]));
+        // Two pictures share the width.
+        let width = if self.comparison.is_side_by_side() { width / 2 } else { width };
+        if width > 0 && height > 0 && u64::from(width) * u64::from(height) <= MAX_PIXELS {
+            self.args.size = (width, height);
+        }
+
+        let response = ui.interact(rect, ui.id().with("picture"), Sense::click_and_drag());
+        let dragged = response.drag_delta() * scale;
+        let dragged = Vec2::new(dragged.x, dragged.y);
+        let notches =
+            if response.hovered() { ui.ctx().input(|input| input.smooth_scroll_delta().y) / 50.0 } else { 0.0 };
+        let (mode, rows) = (self.camera_mode, height as f32);
+        if response.dragged() {
+            self.is_steering = true;
+        }
+        if let (true, Some(at)) = (response.clicked(), response.interact_pointer_pos()) {
+            let [left, top] = self.corner;
+            let mut pixel = UVec2::new(pixels(at.x).saturating_sub(left), pixels(at.y).saturating_sub(top));
+            if self.comparison.is_side_by_side() {
+                pixel.x %= width.max(1);
+            }
+            if self.explains {
+                desk.explain(pixel);
+            } else {
+                desk.pick(pixel);
+            }
+        }
+        if response.dragged_by(PointerButton::Primary) && dragged != Vec2::ZERO {
+            self.move_camera(|camera| camera::turn(camera, mode, dragged));
+        } else if response.dragged() && dragged != Vec2::ZERO {
+            self.move_camera(|camera| camera::pan(camera, dragged, rows));
+        }
+        if notches != 0.0 {
+            self.move_camera(|camera| camera::dolly(camera, notches));
+        }
+    }
+
+    pub(super) fn move_camera(&mut self, change: impl FnOnce(&mut FreeCamera)) {
+        let Some(mut camera) = self.free_camera() else { return };
+        change(&mut camera);
+        let FreeCamera { eye, look_at, fov } = camera;
+        if eye.is_finite() && look_at.is_finite() && eye != look_at && eye.abs().max_element() < 1e9 {
+            (self.args.eye, self.args.look_at, self.args.fov) = (Some(eye), Some(look_at), fov);
+            self.is_steering = true;
+        }
+    }
+}

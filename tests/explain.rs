@@ -1,0 +1,96 @@
+//! `linklight render --explain`: the parts that are told make up the pixel of the picture that is written.
+
+use std::path::Path;
+use std::process::Command;
+
+use linklight::report::image::read;
+use serde_json::Value;
+
+const SCENE: &str = "builtin:cornell-box --size 32x24 --elements 600 --bounces 2 --spp 2 --set rays_per_element=64";
+
+/// Runs `render` with `--explain`; its text, its data, and the picture's pixel.
+fn explained(folder: &Path, options: &str, [x, y]: [usize; 2]) -> (String, Value, [f64; 3]) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_linklight"));
+    command.current_dir(folder).args(["render", "--quiet", "--validate", "-o", "a.exr"]);
+    command.args(["--explain", &format!("{x},{y}"), "--explain-json", "a.json"]).args(options.split_whitespace());
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{options}: {said}");
+    let picture = read(&folder.join("a.exr")).unwrap();
+    let pixel = picture.rgb[y * picture.width as usize + x].as_dvec3().to_array();
+    let json = serde_json::from_str(&std::fs::read_to_string(folder.join("a.json")).unwrap()).unwrap();
+    (String::from_utf8(output.stdout).unwrap(), json, pixel)
+}
+
+/// How far the entries are from the pixel, as a share of its brightest channel.
+fn difference(json: &Value, pixel: [f64; 3]) -> f64 {
+    let entries = json["entries"].as_array().unwrap();
+    let most = pixel.into_iter().fold(1e-30, f64::max);
+    let off = |c: usize| entries.iter().map(|e| e["radiance"][c].as_f64().unwrap()).sum::<f64>() - pixel[c];
+    (0..3).map(|c| off(c).abs()).fold(0.0, f64::max) / most
+}
+
+/// Entries of a bounce.
+fn of_bounce(json: &Value, bounce: u32) -> usize {
+    json["entries"].as_array().unwrap().iter().filter(|entry| entry["bounce"] == bounce).count()
+}
+
+#[test]
+fn every_method_and_display_is_explained_and_the_parts_make_the_pixel() {
+    let folder = tempfile::tempdir().unwrap();
+    for (options, most_off, links) in [
+        ("--method explicit-visibility", 1e-4, 20),
+        ("--method explicit-visibility --set packed_links=true", 1e-4, 20),
+        ("--method implicit-visibility --set bins=8 --diffuse", 1e-4, 20),
+        ("--method antiradiance --diffuse", 1e-4, 3),
+        ("--method antiradiance --diffuse --display splat", 1e-4, 2),
+        ("--method surface-shadow-maps --display lightmap --set atlas_resolution=32 --set keep_maps=false", 1e-4, 8),
+        ("--method face-cluster --diffuse", 1e-4, 1),
+        ("--method face-cluster", 1e-4, 1),
+        ("--method path-tracing --spp 8", 1e-6, 1),
+    ] {
+        let scene = SCENE.split(" --set").next().unwrap();
+        let own = if options.contains("explicit") { SCENE } else { scene };
+        let (text, json, pixel) = explained(folder.path(), &format!("{own} {options}"), [20, 17]);
+        let off = difference(&json, pixel);
+        assert!(off < most_off, "{options}: off by {off:.2e}\n{text}");
+        assert!(of_bounce(&json, 1) >= links && of_bounce(&json, 2) >= 1, "{options}: too few links\n{text}");
+        assert!(text.contains("pixel 20,17") && text.contains("bounce 2"), "{text}");
+        assert_eq!(json["method"], options.split_whitespace().nth(1).unwrap());
+
+        // The check itself: an entry that is off, or left out, is found.
+        let mut planted = json.clone();
+        let brightest = planted["entries"][0]["radiance"][1].as_f64().unwrap();
+        planted["entries"][0]["radiance"][1] = (1.01 * brightest).into();
+        assert!(difference(&planted, pixel) > most_off, "{options}");
+        planted["entries"].as_array_mut().unwrap().remove(0);
+        assert!(difference(&planted, pixel) > most_off, "{options}");
+    }
+}
+
+#[test]
+fn lights_and_backgrounds_are_told_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "builtin:maze --size 32x24 --elements 2000 --bounces 1 --spp 1 --set rays_per_element=64";
+    let (text, json, pixel) = explained(folder.path(), scene, [16, 20]);
+    assert!(difference(&json, pixel) < 1e-4, "{text}");
+    assert!(text.contains(" light "), "{text}");
+}
+
+#[test]
+fn what_cannot_be_explained_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (options, word) in [
+        ("--explain 32,0", "32 x 24"),
+        ("--explain 3", "X,Y"),
+        ("--explain-json a.json", "--explain"),
+        ("--explain 3,3 --method implicit-visibility --view charts --set bins=4", "leave --view"),
+    ] {
+        let scene = SCENE.split(" --set").next().unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_linklight"));
+        command.current_dir(folder.path()).args(["render", "--quiet", "-o", "a.exr"]);
+        let output = command.args(format!("{scene} {options}").split_whitespace()).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && said.contains(word), "{options}: {said}");
+    }
+}
