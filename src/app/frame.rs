@@ -218,6 +218,36 @@ impl Method {
         }
     }
 
+    /// Takes over surfaces and lights that moved (`has_moved`, else links that are older than that go on being made);
+    /// false where all must be prepared anew.
+    pub fn follow(
+        &mut self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        has_moved: bool,
+        watch: &dyn Watch,
+    ) -> Result<bool, AppError> {
+        match self {
+            Self::PathTracing(_) => Ok(true),
+            Self::OnElements(shown) => {
+                shown.method.follow(context, &explicit_stage(stage, watch), has_moved)?;
+                shown.gather = Gather::of_display(context, request, stage, &*shown.method)?;
+                Ok(true)
+            }
+            Self::OnTexels(shown) => shown.follow(context, request, stage, watch),
+            Self::FaceClusters(_) => Ok(false),
+        }
+    }
+
+    /// Frames since the oldest links were made, where they are older than the surfaces' places.
+    pub fn link_age(&self) -> Option<u32> {
+        match self {
+            Self::OnElements(shown) => shown.method.link_age(),
+            _ => None,
+        }
+    }
+
     /// Takes over what `request` changed of the picture alone: its size, its display and what that was told. The
     /// solution stays.
     pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {

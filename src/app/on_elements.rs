@@ -41,6 +41,14 @@ pub trait OnElements {
         self.solve(context, stage, bounces)
     }
 
+    /// Takes over surfaces and lights that moved (`has_moved`, else old links go on being made).
+    fn follow(&mut self, context: &Context, stage: &Stage<'_>, has_moved: bool) -> Result<(), AppError>;
+
+    /// Frames since the oldest links were made, where they are older than the surfaces' places.
+    fn link_age(&self) -> Option<u32> {
+        None
+    }
+
     /// Angle between normals, radians, below which neighbours' indirect light is averaged; `None` without smoothing.
     fn smoothing(&self) -> Option<f32>;
 
@@ -113,6 +121,24 @@ impl OnElements for ExplicitVisibility {
         Ok(recorder.submit()?)
     }
 
+    fn follow(&mut self, context: &Context, stage: &Stage<'_>, has_moved: bool) -> Result<(), AppError> {
+        let rays = self.settings().link_rays_per_frame;
+        let followed = match (rays, has_moved) {
+            (0, false) => Ok(()),
+            (0, true) => Self::follow(self, context, stage),
+            (rays, has_moved) => self.follow_within(context, stage, rays, has_moved),
+        };
+        followed.map_err(AppError::failed)
+    }
+
+    fn link_age(&self) -> Option<u32> {
+        self.is_stale().then(|| self.oldest_link())
+    }
+
+    fn false_colors(&self, context: &Context, _: &World, _: &View, _: UVec2) -> Result<Option<Buffer<Vec3>>, AppError> {
+        Ok(self.view_colors().map(|colors| context.upload("explicit/view colors", &colors)).transpose()?)
+    }
+
     fn keeps_links(&self) -> bool {
         true
     }
@@ -129,6 +155,11 @@ impl OnElements for ImplicitVisibility {
         self.link(context, stage).map_err(AppError::failed)?;
         tracing::info!("{}", self.report());
         self.solve_again(context, stage, bounces)
+    }
+
+    /// Every solve makes all links anew.
+    fn follow(&mut self, _: &Context, _: &Stage<'_>, _: bool) -> Result<(), AppError> {
+        Ok(())
     }
 
     fn solve_again(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), AppError> {
@@ -193,6 +224,13 @@ impl OnElements for Antiradiance {
 
     fn splats(&self) -> Option<&Splats> {
         Some(Self::splats(self))
+    }
+
+    fn follow(&mut self, context: &Context, stage: &Stage<'_>, has_moved: bool) -> Result<(), AppError> {
+        if has_moved {
+            Self::follow(self, context, stage, false).map_err(AppError::failed)?;
+        }
+        Ok(())
     }
 
     fn bounces_are_apart(&self) -> bool {

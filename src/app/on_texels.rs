@@ -15,6 +15,8 @@ use crate::methods::surface_shadow_maps::{self, Lit, Report, SurfaceShadowMaps};
 use crate::report::image::write_exr;
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
+use glam::Vec3;
+use std::path::Path;
 
 /// Surface shadow maps, ready to be shown.
 pub struct TexelsShown {
@@ -49,6 +51,30 @@ impl Shown {
     }
 }
 
+/// What the method sees of a staged scene.
+fn of_scene<'a>(
+    request: &RenderRequest,
+    stage: &'a Stage,
+    positions: &'a [Vec3],
+    cache: Option<&'a Path>,
+    watch: &'a dyn Watch,
+) -> surface_shadow_maps::Stage<'a> {
+    surface_shadow_maps::Stage {
+        scene: &stage.scene,
+        geometry: &stage.geometry,
+        positions,
+        rest_positions: &stage.rest_positions,
+        pose: &stage.pose,
+        bounds: stage.bounds,
+        world: &stage.world,
+        tracer: stage.tracer(),
+        tone: request.tone,
+        seed: request.seed,
+        cache,
+        watch,
+    }
+}
+
 impl TexelsShown {
     pub fn prepare(
         context: &Context,
@@ -56,28 +82,27 @@ impl TexelsShown {
         stage: &Stage,
         watch: &dyn Watch,
     ) -> Result<Self, AppError> {
-        let positions = context.download(&stage.world.positions)?;
-        let cache = cache_folder();
-        let of_scene = surface_shadow_maps::Stage {
-            scene: &stage.scene,
-            geometry: &stage.geometry,
-            positions: &positions,
-            rest_positions: &stage.rest_positions,
-            pose: &stage.pose,
-            bounds: stage.bounds,
-            world: &stage.world,
-            tracer: stage.tracer(),
-            tone: request.tone,
-            seed: request.seed,
-            cache: cache.as_deref(),
-            watch,
-        };
+        let (positions, cache) = (context.download(&stage.world.positions)?, cache_folder());
+        let of_scene = of_scene(request, stage, &positions, cache.as_deref(), watch);
         let method = SurfaceShadowMaps::prepare(context, &of_scene, request.settings()?).map_err(AppError::failed)?;
         tracing::info!("{}", method.report());
         let shown = Shown::new(context, request, &method)?;
         let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         Ok(Self { method, shadow_maps, g_buffer, shown })
+    }
+
+    /// As [`super::frame::Method::follow`].
+    pub fn follow(
+        &mut self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        watch: &dyn Watch,
+    ) -> Result<bool, AppError> {
+        let positions = context.download(&stage.world.positions)?;
+        let of_scene = of_scene(request, stage, &positions, None, watch);
+        self.method.place(context, &of_scene).map_err(AppError::failed)
     }
 
     /// What shows the atlas, where it is shown by a filter over its texels.

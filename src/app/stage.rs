@@ -27,6 +27,9 @@ const DEFAULT_ELEMENTS: u32 = 20_000;
 /// Of those, at most as long, as a share of the scene's diagonal: half a step of a stair in a house.
 const DEFAULT_LONGEST_EDGE: f32 = 1.0 / 40.0;
 
+/// The hierarchy is built anew where rays cost so many times what they did after the last building.
+const WORST_REFIT: f32 = 1.5;
+
 /// Everything a frame starts from.
 pub struct Stage {
     pub scene: Scene,
@@ -60,6 +63,29 @@ impl Stage {
         self.world.update_materials(&mut recorder, &self.scene, request.diffuse);
         self.world.pose(&mut recorder, &self.pose);
         Ok(recorder.submit()?)
+    }
+
+    /// Moves the scene to the time of `request`; what is on the device moves there.
+    pub fn follow(&mut self, context: &Context, request: &RenderRequest) -> Result<(), AppError> {
+        self.pose = Pose::at(&self.scene, request.seconds);
+        let vertices = deform::world_vertices(&self.geometry, &self.pose);
+        let bounds = vertices.bounds().filter(|[low, high]| low.is_finite() && high.is_finite());
+        let Some(bounds) = bounds else {
+            let seconds = self.pose.seconds;
+            return Err(AppError::failed(format!("at {seconds} s no vertex of the scene is at a finite place")));
+        };
+        self.bounds = bounds;
+        let mut recorder = context.recorder("world")?;
+        self.world.pose(&mut recorder, &self.pose);
+        self.bvh.refit(&mut recorder, &self.world.positions).map_err(AppError::failed)?;
+        if let Some(structure) = &self.acceleration {
+            recorder.build_acceleration_structure(structure, &self.world.positions, &self.world.triangles);
+        }
+        recorder.submit()?;
+        if self.bvh.needs_rebuild(context, WORST_REFIT).map_err(AppError::failed)? {
+            self.bvh.rebuild(context, &self.world.positions).map_err(AppError::failed)?;
+        }
+        Ok(())
     }
 
     /// Places a scene that was loaded, and edited, before.

@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn what_is_no_view_is_refused_with_those_there_are() {
         let refused = |options: &str| request(options).unwrap_err();
-        assert!(refused("--view charts").contains("has none"), "explicit visibility has no views");
+        assert!(refused("--method path-tracing --view charts").contains("has none"), "path tracing has no views");
         assert!(refused("--method implicit-visibility --view chart").contains("charts"));
         assert!(refused("--method implicit-visibility --display final-gather --view charts").contains("cut-size"));
         assert!(refused("--method antiradiance --view radiance").contains("no view"), "light is no debug view");
@@ -137,7 +137,7 @@ mod tests {
         let mut text = Vec::new();
         list(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
-        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size"] {
+        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size", "link-age"] {
             assert!(text.contains(&format!("--view {name} ")), "{name} in\n{text}");
         }
     }

@@ -138,7 +138,9 @@ impl Explanation {
         let shown = if self.display.is_empty() { String::new() } else { format!(", shown by {}", self.display) };
         // Writing to a String cannot fail.
         let _ = writeln!(text, "pixel {x},{y} by {}{shown}", self.method);
-        self.seen.iter().for_each(|line| drop(writeln!(text, "  sees {line}")));
+        for line in &self.seen {
+            let _ = writeln!(text, "  sees {line}");
+        }
         let _ = writeln!(
             text,
             "  radiance {} = direct {} + indirect {}",

@@ -4,11 +4,12 @@
 //! to sender. The list is cut into windows of whole rows, none larger than a pass can bind. What it does not do: cast
 //! rays ([`super::trace`]) or send light ([`super::gather`]).
 
+use super::link_rows::{RowWords, Rows};
 use super::scan::{self, ScanScratch};
 use crate::gpu::shaders::links as passes;
 use crate::gpu::shaders::types::{Hit, RowEntry};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
-use glam::{UVec3, Vec3};
+use glam::UVec3;
 use std::ops::Range;
 
 /// Elements that a packed link can name.
@@ -65,19 +66,6 @@ impl Link {
     }
 }
 
-/// As `decode_64` of `lib/shared_exponent.glsl`.
-fn from_shared_64(word: u64) -> Vec3 {
-    let (x, y) = (word as u32, (word >> 32) as u32);
-    let mantissas = [x >> 14, (x & 0x3fff) << 4 | y >> 28, y >> 10 & 0x3_ffff];
-    f32::from_bits((y & 0x3ff) << 23) * Vec3::from_array(mantissas.map(|m| m as f32))
-}
-
-/// As `decode_32`.
-fn from_shared_32(word: u32) -> Vec3 {
-    let mantissas = [word >> 24, word >> 16 & 0xff, word >> 8 & 0xff];
-    f32::from_bits((word & 0xff) << 23) * Vec3::from_array(mantissas.map(|m| m as f32))
-}
-
 /// The links of some consecutive receivers, a word each; some room may be left at the end.
 pub struct LinkWindow<W> {
     pub first_element: u32,
@@ -129,6 +117,9 @@ pub enum LinkWords {
     Packed(LinkSet<u32>),
 }
 
+/// Words of rows that are written at once.
+const ROW_PIECE: usize = 1 << 20;
+
 /// All links of a scene.
 pub struct Links {
     /// `element_count + 1` entries over all windows, the first 0.
@@ -162,39 +153,6 @@ impl Links {
             LinkWords::Packed(set) => set.windows.clear(),
         }
         self.link_count = 0;
-    }
-
-    /// The links of one receiver.
-    pub fn of_element(&self, context: &Context, element: u32) -> Result<Vec<Link>, GpuError> {
-        let at = element as usize;
-        let [first, last] = context.download_range(&self.offsets, at..at + 2)?[..] else { return Ok(Vec::new()) };
-        fn of_set<W: bytemuck::Pod>(
-            context: &Context,
-            set: &LinkSet<W>,
-            element: u32,
-            (first, last): (u32, u32),
-        ) -> Result<Vec<W>, GpuError> {
-            let has_it = |w: &&LinkWindow<W>| (w.first_element..w.first_element + w.element_count).contains(&element);
-            let Some(window) = set.windows.iter().find(has_it) else { return Ok(Vec::new()) };
-            let place = |link: u32| (link - window.first_link) as usize;
-            context.download_range(&window.words, place(first)..place(last))
-        }
-        Ok(match &self.words {
-            LinkWords::Full(set) => {
-                of_set(context, set, element, (first, last))?.into_iter().map(Link::from_word).collect()
-            }
-            LinkWords::Packed(set) => {
-                of_set(context, set, element, (first, last))?.into_iter().map(Link::from_packed).collect()
-            }
-        })
-    }
-
-    /// Radiosity of every sender as it was last sent along the links, W/m2.
-    pub fn sent(&self, context: &Context) -> Result<Vec<Vec3>, GpuError> {
-        Ok(match &self.words {
-            LinkWords::Full(set) => context.download(&set.sent)?.into_iter().map(from_shared_64).collect(),
-            LinkWords::Packed(set) => context.download(&set.sent)?.into_iter().map(from_shared_32).collect(),
-        })
     }
 
     /// All links, for tests and views; offsets into them are [`Self::offsets`].
@@ -251,6 +209,11 @@ pub struct LinkCounts {
 /// Builds [`Links`] from batches of hits, in order of receivers: [`Self::merge`], submit, [`Self::append`].
 pub struct LinkBuilder<'c> {
     context: &'c Context,
+    unfinished: UnfinishedLinks,
+}
+
+/// What a [`LinkBuilder`] has built so far, to be gone on with later ([`LinkBuilder::resume`]).
+pub struct UnfinishedLinks {
     counts: LinkCounts,
     budget: u64,
     /// A row of `3 * rays` for each receiver of a batch.
@@ -273,8 +236,7 @@ impl<'c> LinkBuilder<'c> {
             return Err(LinkError::TooManyForPacked(counts.senders));
         }
         let rows = counts.batch as usize;
-        Ok(Self {
-            context,
+        let unfinished = UnfinishedLinks {
             counts,
             budget,
             row_entries: context.buffer("links/row entries", rows * 3 * counts.rays as usize)?,
@@ -289,7 +251,17 @@ impl<'c> LinkBuilder<'c> {
                 element_count: counts.receivers,
                 link_count: 0,
             },
-        })
+        };
+        Ok(Self { context, unfinished })
+    }
+
+    /// Goes on where [`Self::pause`] stopped.
+    pub fn resume(context: &'c Context, unfinished: UnfinishedLinks) -> Self {
+        Self { context, unfinished }
+    }
+
+    pub fn pause(self) -> UnfinishedLinks {
+        self.unfinished
     }
 
     /// Turns the hits of the receivers of `batch` into rows.
@@ -302,60 +274,59 @@ impl<'c> LinkBuilder<'c> {
         back_elements: &Buffer<u32>,
         outcomes: &Outcomes,
     ) {
+        let UnfinishedLinks { counts, row_entries, row_counts, scan, .. } = &self.unfinished;
         let batch_count = batch.len() as u32;
         let pass = passes::MergeHits {
             hits,
             triangles,
             back_elements,
-            row_entries: &self.row_entries,
-            row_counts: &self.row_counts,
+            row_entries,
+            row_counts,
             escaped: &outcomes.escaped,
             outcomes: &outcomes.counts,
             // As many buckets as fit in 32 KiB beside the table of 1024 rays.
             constants: passes::MergeHitsConstants {
-                rays: self.counts.rays,
-                buckets: if self.counts.rays > 576 { 256 } else { 1024 },
+                rays: counts.rays,
+                buckets: if counts.rays > 576 { 256 } else { 1024 },
             },
-            params: passes::MergeHitsParams {
-                first_element: batch.start,
-                batch_count,
-                sender_count: self.counts.senders,
-            },
+            params: passes::MergeHitsParams { first_element: batch.start, batch_count, sender_count: counts.senders },
         };
         recorder.dispatch(&pass, batch_count * passes::MergeHits::PROGRAM.workgroup[0]);
         // One value more than there are counts: the total.
-        scan::exclusive(recorder, &self.row_counts, batch_count as usize + 1, &self.scan);
+        scan::exclusive(recorder, row_counts, batch_count as usize + 1, scan);
     }
 
     /// Adds the rows of a merged batch to the list, in a new window where the last one has no room.
     pub fn append(&mut self, batch: Range<u32>) -> Result<(), LinkError> {
+        let context = self.context;
+        let UnfinishedLinks { counts, budget, row_entries, row_counts, links, .. } = &mut self.unfinished;
         let batch_count = batch.len() as u32;
-        let total = self.context.download_range(&self.row_counts, batch.len()..batch.len() + 1)?[0];
-        let link_count = u64::from(self.links.link_count) + u64::from(total);
+        let total = context.download_range(row_counts, batch.len()..batch.len() + 1)?[0];
+        let link_count = u64::from(links.link_count) + u64::from(total);
         let after = u32::try_from(link_count).map_err(|_| LinkError::TooMany(link_count))?;
 
-        let (context, held) = (self.context, self.links.size_bytes());
-        let (link_base, row_capacity) = (self.links.link_count, 3 * self.counts.rays);
+        let held = links.size_bytes();
+        let (link_base, row_capacity) = (links.link_count, 3 * counts.rays);
         let capacity = |link_bytes| {
-            let budget = self.budget.saturating_sub(held).min(context.available_bytes());
-            window_capacity(context, &self.counts, &batch, total, link_base, link_bytes, (held, budget))
+            let budget = budget.saturating_sub(held).min(context.available_bytes());
+            window_capacity(context, counts, &batch, total, link_base, link_bytes, (held, budget))
         };
         let mut recorder = context.recorder("links")?;
-        match &mut self.links.words {
+        match &mut links.words {
             LinkWords::Full(set) => {
                 let window = set.window_for(context, batch.start, total, || capacity(size_of::<u64>() as u64))?;
                 let pass = passes::WriteRows {
-                    row_offsets: &self.row_counts,
-                    row_entries: &self.row_entries,
+                    row_offsets: row_counts,
+                    row_entries,
                     links: &window.words,
-                    link_offsets: &self.links.offsets,
+                    link_offsets: &links.offsets,
                     params: passes::WriteRowsParams {
                         first_element: batch.start,
                         batch_count,
                         row_capacity,
                         link_base,
                         window_base: window.link_count,
-                        unit_weight: 1.0 / (RAY_UNITS * self.counts.rays) as f32,
+                        unit_weight: 1.0 / (RAY_UNITS * counts.rays) as f32,
                     },
                 };
                 recorder.dispatch(&pass, batch_count * passes::WriteRows::PROGRAM.workgroup[0]);
@@ -365,17 +336,17 @@ impl<'c> LinkBuilder<'c> {
             LinkWords::Packed(set) => {
                 let window = set.window_for(context, batch.start, total, || capacity(size_of::<u32>() as u64))?;
                 let pass = passes::WritePackedRows {
-                    row_offsets: &self.row_counts,
-                    row_entries: &self.row_entries,
+                    row_offsets: row_counts,
+                    row_entries,
                     packed_links: &window.words,
-                    link_offsets: &self.links.offsets,
+                    link_offsets: &links.offsets,
                     params: passes::WritePackedRowsParams {
                         first_element: batch.start,
                         batch_count,
                         row_capacity,
                         link_base,
                         window_base: window.link_count,
-                        unit_divisor: RAY_UNITS * self.counts.rays / PACKED_UNITS,
+                        unit_divisor: RAY_UNITS * counts.rays / PACKED_UNITS,
                     },
                 };
                 recorder.dispatch(&pass, batch_count);
@@ -384,13 +355,60 @@ impl<'c> LinkBuilder<'c> {
             }
         }
         recorder.submit()?;
-        self.links.link_count = after;
+        links.link_count = after;
+        Ok(())
+    }
+
+    /// Adds rows made elsewhere to the list.
+    pub fn append_rows(&mut self, receivers: Range<u32>, rows: &Rows) -> Result<(), LinkError> {
+        let context = self.context;
+        let UnfinishedLinks { counts, budget, links, .. } = &mut self.unfinished;
+        let total = rows.offsets.last().copied().unwrap_or(0);
+        let link_count = u64::from(links.link_count) + u64::from(total);
+        let after = u32::try_from(link_count).map_err(|_| LinkError::TooMany(link_count))?;
+        let (held, link_base) = (links.size_bytes(), links.link_count);
+        let capacity = |link_bytes| {
+            let budget = budget.saturating_sub(held).min(context.available_bytes());
+            window_capacity(context, counts, &receivers, total, link_base, link_bytes, (held, budget))
+        };
+        fn fill<W: bytemuck::Pod>(
+            context: &Context,
+            window: &mut LinkWindow<W>,
+            words: &[W],
+            rows: u32,
+        ) -> Result<(), GpuError> {
+            for (piece, first) in words.chunks(ROW_PIECE).zip((window.link_count as usize..).step_by(ROW_PIECE)) {
+                let mut recorder = context.recorder("links")?;
+                recorder.write(&window.words, first, piece);
+                recorder.submit()?;
+            }
+            window.element_count += rows;
+            window.link_count += words.len() as u32;
+            Ok(())
+        }
+        let count = receivers.len() as u32;
+        match (&mut links.words, &rows.words) {
+            (LinkWords::Full(set), RowWords::Full(words)) => {
+                let window = set.window_for(context, receivers.start, total, || capacity(size_of::<u64>() as u64))?;
+                fill(context, window, words, count)?;
+            }
+            (LinkWords::Packed(set), RowWords::Packed(words)) => {
+                let window = set.window_for(context, receivers.start, total, || capacity(size_of::<u32>() as u64))?;
+                fill(context, window, words, count)?;
+            }
+            _ => return Err(GpuError::Refused("rows of another link format".into()).into()),
+        }
+        let offsets: Vec<u32> = rows.offsets.iter().map(|offset| link_base + offset).collect();
+        let mut recorder = context.recorder("links")?;
+        recorder.write(&links.offsets, receivers.start as usize, &offsets);
+        recorder.submit()?;
+        links.link_count = after;
         Ok(())
     }
 
     /// The links of all batches appended.
     pub fn finish(self) -> Links {
-        self.links
+        self.unfinished.links
     }
 }
 

@@ -15,6 +15,7 @@ pub mod hierarchy;
 pub mod irradiance_vector;
 pub mod kept;
 pub mod levels;
+pub mod link_rows;
 pub mod links;
 pub mod pair_queue;
 pub mod punctual;

@@ -1,5 +1,6 @@
 //! Explicit visibility: every pass against a plain twin, the links' invariants, physics, determinism, deformation.
 
+mod asynchronous;
 #[path = "../common/mod.rs"]
 mod common;
 mod dynamics;

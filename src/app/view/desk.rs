@@ -46,6 +46,8 @@ pub struct Shown {
     pub lights: Vec<(String, glam::Vec3)>,
     /// From request to film.
     pub milliseconds: f64,
+    /// Frames since the oldest links were made, where newer ones are under way.
+    pub link_age: Option<u32>,
 }
 
 /// What the work says while it lasts.
@@ -241,6 +243,7 @@ impl Desk {
                         lights: stage.scene.lights.iter().map(|light| (light.name.clone(), light.intensity)).collect(),
                         cameras: stage.scene.cameras.iter().map(|camera| camera.name.clone()).collect(),
                         milliseconds: start.elapsed().as_secs_f64() * 1e3,
+                        link_age: engine.link_age(),
                         job,
                     });
                 }

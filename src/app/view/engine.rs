@@ -27,6 +27,8 @@ pub enum Depth {
     Frame,
     /// Albedo and intensities.
     Light,
+    /// Where surfaces and lights are at another time.
+    Follow,
     /// What the display stage keeps: buffers of the picture's size.
     Display,
     /// What the method prepares: links, maps, clusters.
@@ -48,7 +50,6 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
         || old.diffuse != new.diffuse
         || old.elements != new.elements
         || old.rays != new.rays
-        || old.seconds != new.seconds
         || tessellates(old) != tessellates(new)
         || (old.edits != new.edits && !keeps_links(&old.edits, &new.edits))
     {
@@ -63,6 +64,8 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
         || (is_traced && old.bounces != new.bounces)
     {
         Some(Depth::Display)
+    } else if old.seconds != new.seconds {
+        Some(Depth::Follow)
     } else if old.edits != new.edits {
         Some(Depth::Light)
     } else if old.camera != new.camera
@@ -118,6 +121,8 @@ pub struct Engine<'c> {
     originals: Option<Originals>,
     /// Those that stage and method have taken over.
     edits: Vec<Edit>,
+    /// The time that they have.
+    seconds: f32,
     stage: Option<Stage>,
     method: Option<Method>,
     /// What scene, stage and method were made for.
@@ -136,6 +141,7 @@ impl<'c> Engine<'c> {
             scene: None,
             originals: None,
             edits: Vec::new(),
+            seconds: 0.0,
             stage: None,
             method: None,
             last: None,
@@ -162,6 +168,12 @@ impl<'c> Engine<'c> {
         };
         let frame = explain::Frame { context: self.context, request, stage, film: &film, watch };
         explain::explain(frame, method, pixel)
+    }
+
+    /// Frames since the oldest links were made, where they are older than the surfaces' places: rendering the same
+    /// picture again makes them younger.
+    pub fn link_age(&self) -> Option<u32> {
+        self.method.as_ref().and_then(Method::link_age)
     }
 
     pub fn is_lost(&self) -> bool {
@@ -220,6 +232,17 @@ impl<'c> Engine<'c> {
             }
         }
         self.edits.clone_from(&request.edits);
+        let has_moved = self.seconds != request.seconds && depth < Depth::Stage;
+        if has_moved {
+            stage.follow(self.context, request)?;
+        }
+        self.seconds = request.seconds;
+        if let Some(method) = &mut self.method
+            && (has_moved || method.link_age().is_some())
+            && !method.follow(self.context, request, stage, has_moved, watch)?
+        {
+            self.method = None;
+        }
         stage.look(request)?;
         match &mut self.method {
             Some(method) if depth >= Depth::Display => method.show(self.context, request, stage)?,

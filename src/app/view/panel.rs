@@ -88,10 +88,11 @@ fn work(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         }
         _ => {
             let text = match &viewer.shown {
-                Some(shown) => format!(
-                    "{:.1} ms, {} elements, {} triangles",
-                    shown.milliseconds, shown.facts.elements, shown.facts.triangles
-                ),
+                Some(shown) => {
+                    let age = shown.link_age.map(|age| format!(", links {age} frames old")).unwrap_or_default();
+                    let (ms, facts) = (shown.milliseconds, &shown.facts);
+                    format!("{ms:.1} ms, {} elements, {} triangles{age}", facts.elements, facts.triangles)
+                }
                 None => "loading".to_owned(),
             };
             ui.label(text);

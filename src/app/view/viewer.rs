@@ -169,6 +169,10 @@ impl Viewer {
         }
         if let Some(shown) = self.news.shown.take() {
             self.profiler.finish_frame(shown.milliseconds);
+            if shown.link_age.is_some() {
+                // The same picture again, along younger links.
+                self.ask_again();
+            }
             self.shown = Some(shown);
         }
         if let Some(compared) = self.news.compared.take() {
@@ -333,7 +337,7 @@ impl Viewer {
     /// The film shown is the one that the options decide, in full quality.
     fn is_settled(&self) -> bool {
         let Some(shown) = &self.shown else { return false };
-        let is_final = !shown.job.is_preview && !self.news.is_working && !self.is_moving();
+        let is_final = !shown.job.is_preview && !self.news.is_working && !self.is_moving() && shown.link_age.is_none();
         let is_current = |request: RenderRequest| change(&shown.job.request, &request).is_none();
         is_final && request(&self.args).is_ok_and(is_current)
     }

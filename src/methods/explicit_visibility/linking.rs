@@ -3,13 +3,15 @@
 use super::{RayCount, Settings, Stage};
 use crate::gpu::shaders::methods::explicit_visibility as passes;
 use crate::gpu::shaders::types::{Hit, Ray};
-use crate::gpu::{Context, GpuError};
+use crate::gpu::{Buffer, Context, GpuError};
 use crate::scene::environment::Environment;
+use crate::stages::bvh::BvhError;
 use crate::stages::elements::{ElementTopology, Elements};
-use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
+use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes, UnfinishedLinks};
 use crate::stages::trace;
 use crate::stages::work::Interrupted;
 use crate::stages::world::WorldEnvironment;
+use std::ops::Range;
 
 /// Rays of a batch, where memory allows.
 const BATCH_RAYS: u64 = 1 << 19;
@@ -21,6 +23,8 @@ pub enum ExplicitError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Link(#[from] LinkError),
+    #[error(transparent)]
+    Bvh(#[from] BvhError),
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
     #[error(
@@ -70,36 +74,83 @@ impl Sizes {
         Ok(sizes)
     }
 
+    /// Elements of a batch.
+    pub fn elements_at_once(&self) -> u32 {
+        self.batch
+    }
+
+    /// Elements whose rays are at most `rays`, at least one.
+    pub fn elements_of(&self, rays: u32) -> u32 {
+        (rays / self.ray_count).max(1)
+    }
+
     /// Rays of a batch of shadow rays: one element's rays to every emitter sample fit in any case.
     pub fn shadow_rays(&self) -> usize {
         (self.batch * self.ray_count).max(1024) as usize
     }
 }
 
-/// Casts the rays of all elements and makes their links.                           [Schmitz2008 3.2]
-pub(super) fn build(
-    context: &Context,
-    stage: &Stage<'_>,
-    settings: &Settings,
-    elements: &Elements,
-    outcomes: &Outcomes,
-    sizes: &Sizes,
-) -> Result<Links, ExplicitError> {
-    let (ray_count, batch) = (sizes.ray_count, sizes.batch);
-    let rays = context.buffer("links/rays", (batch * ray_count) as usize)?;
-    let hits = context.buffer("links/hits", rays.len())?;
-    let format = if settings.packed_links { LinkFormat::Packed } else { LinkFormat::Full };
-    let counts = LinkCounts { receivers: elements.count, senders: elements.count, rays: ray_count, batch };
-    let mut builder = LinkBuilder::new(context, format, counts, sizes.link_budget)?;
-    for first_element in (0..elements.count).step_by(batch as usize) {
+/// What links are made of.
+#[derive(Clone, Copy)]
+pub(super) struct Linked<'a> {
+    pub settings: &'a Settings,
+    pub elements: &'a Elements,
+    pub outcomes: &'a Outcomes,
+    pub sizes: &'a Sizes,
+}
+
+/// Links under way, batch after batch of receivers.
+pub(super) struct Linking {
+    rays: Buffer<Ray>,
+    hits: Buffer<Hit>,
+    unfinished: UnfinishedLinks,
+    /// The first element without links.
+    next: u32,
+}
+
+impl Linking {
+    pub fn new(context: &Context, linked: Linked<'_>) -> Result<Self, ExplicitError> {
+        let Linked { settings, elements, sizes: &Sizes { ray_count, batch, link_budget }, .. } = linked;
+        let rays = context.buffer("links/rays", (batch * ray_count) as usize)?;
+        let hits = context.buffer("links/hits", rays.len())?;
+        let format = if settings.packed_links { LinkFormat::Packed } else { LinkFormat::Full };
+        let counts = LinkCounts { receivers: elements.count, senders: elements.count, rays: ray_count, batch };
+        let unfinished = LinkBuilder::new(context, format, counts, link_budget)?.pause();
+        Ok(Self { rays, hits, unfinished, next: 0 })
+    }
+
+    /// As [`Self::new`], from element `first` on.
+    pub fn from(context: &Context, linked: Linked<'_>, first: u32) -> Result<Self, ExplicitError> {
+        Ok(Self { next: first, ..Self::new(context, linked)? })
+    }
+
+    pub fn pause(self) -> UnfinishedLinks {
+        self.unfinished
+    }
+
+    pub fn is_done(&self, elements: &Elements) -> bool {
+        self.next >= elements.count
+    }
+
+    /// Casts the rays of the next batch, of at most `most` elements, and makes their links; which elements those were.
+    pub fn step(
+        mut self,
+        context: &Context,
+        stage: &Stage<'_>,
+        linked: Linked<'_>,
+        most: u32,
+    ) -> Result<(Self, Range<u32>), ExplicitError> {
+        let Linked { settings, elements, outcomes, sizes } = linked;
+        let first_element = self.next;
         stage.watch.step("links", first_element.into(), elements.count.into())?;
-        let range = first_element..elements.count.min(first_element + batch);
-        let batch_rays = range.len() * ray_count as usize;
+        let range = first_element..elements.count.min(first_element + sizes.batch.min(most).max(1));
+        let batch_rays = range.len() * sizes.ray_count as usize;
+        let mut builder = LinkBuilder::resume(context, self.unfinished);
         let mut recorder = context.recorder("links")?;
         let pass = passes::Rays {
             ray_origins: &elements.ray_origins,
             element_normals: &elements.normals,
-            rays: &rays,
+            rays: &self.rays,
             params: passes::RaysParams {
                 first_element,
                 batch_count: range.len() as u32,
@@ -108,14 +159,29 @@ pub(super) fn build(
             },
         };
         recorder.dispatch(&pass, batch_rays);
-        trace::closest_hit(&mut recorder, &stage.tracer, &rays, &hits, batch_rays);
+        trace::closest_hit(&mut recorder, &stage.tracer, &self.rays, &self.hits, batch_rays);
         let world = stage.world;
-        builder.merge(&mut recorder, range.clone(), &hits, &world.triangles, &elements.back_elements, outcomes);
+        builder.merge(&mut recorder, range.clone(), &self.hits, &world.triangles, &elements.back_elements, outcomes);
         recorder.submit()?;
-        builder.append(range)?;
+        builder.append(range.clone())?;
+        self.unfinished = builder.pause();
+        self.next = range.end;
+        Ok((self, range))
     }
-    stage.watch.step("links", elements.count.into(), elements.count.into())?;
-    Ok(builder.finish())
+
+    pub fn finish(self, context: &Context) -> Links {
+        LinkBuilder::resume(context, self.unfinished).finish()
+    }
+}
+
+/// Casts the rays of all elements and makes their links.                           [Schmitz2008 3.2]
+pub(super) fn build(context: &Context, stage: &Stage<'_>, linked: Linked<'_>) -> Result<Links, ExplicitError> {
+    let mut linking = Linking::new(context, linked)?;
+    while !linking.is_done(linked.elements) {
+        (linking, _) = linking.step(context, stage, linked, u32::MAX)?;
+    }
+    stage.watch.step("links", linked.elements.count.into(), linked.elements.count.into())?;
+    Ok(linking.finish(context))
 }
 
 /// The environment at the density of the rays, so that none of its light falls between them.

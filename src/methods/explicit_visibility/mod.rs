@@ -21,19 +21,24 @@
 //!
 //! **Per frame without casting rays:** brightness of lights, emission that stays where it is, albedo, the environment.
 //! **With shadow rays alone:** lights that move ([`ExplicitVisibility::trace_lights`]). **With new links:** surfaces
-//! that move or deform ([`ExplicitVisibility::follow`]).
+//! that move or deform ([`ExplicitVisibility::follow`], or spread over frames,
+//! [`ExplicitVisibility::follow_within`]).
 //!
 //! Differs from [Schmitz2008]: radiosity and irradiance instead of radiance; a double-sided surface has elements on
 //! both sides; area lights and an environment; elements inside other things take their neighbours' light. What it does
-//! not do: glossy transport between elements, and updates spread over frames.
+//! not do: glossy transport between elements.
 //!
 //! [Schmitz2008]: crate::methods::PAPERS
 
+mod asynchronous;
 mod carried;
+mod devices;
 mod linking;
 mod ray_count;
 mod report;
 
+pub use asynchronous::Shown;
+pub use devices::Helper;
 pub use linking::ExplicitError;
 pub use ray_count::RayCount;
 pub use report::Report;
@@ -53,7 +58,7 @@ use crate::stages::work::Watch;
 use crate::stages::world::{World, WorldEnvironment};
 use crate::stages::{gather, punctual};
 use glam::Vec3;
-use linking::Sizes;
+use linking::{Linked, Sizes};
 
 crate::settings! {
     /// What explicit visibility lets the user choose.
@@ -72,6 +77,11 @@ crate::settings! {
         emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
         /// Store links in 4 bytes instead of 8: faster; weights off by 1/4096, radiosity by 1/512 at most.
         packed_links: bool = false, paper "off";
+        /// While surfaces move: rays for new links in a frame, which is lit along the old ones until all are new; 0 makes
+        /// all of them in every frame.
+        link_rays_per_frame: u32 = 0, range 0..=4_000_000_000, unit "rays", paper "asynchronous, on a second device";
+        /// What the picture shows.
+        show: Shown = Shown::Light, paper "light";
         /// How far rays start off their surface, as a share of the scene's extent.
         ray_offset: f32 = 1e-5, range 1e-7..=1e-2, paper "not given";
     }
@@ -85,6 +95,7 @@ pub struct ExplicitVisibility {
     emitters: Emitters,
     links: Links,
     outcomes: Outcomes,
+    ages: asynchronous::Ages,
     state: State,
     /// Averaged to the density of the rays.
     environment: WorldEnvironment,
@@ -128,12 +139,32 @@ impl ExplicitVisibility {
         Self::prepare_within(context, stage, settings, u64::MAX)
     }
 
+    /// As [`Self::prepare`], with links made by `helpers` too.
+    pub fn prepare_over(
+        context: &Context,
+        stage: &Stage<'_>,
+        settings: Settings,
+        helpers: &[Helper],
+    ) -> Result<Self, ExplicitError> {
+        Self::prepare_by(context, stage, settings, u64::MAX, helpers)
+    }
+
     /// As [`Self::prepare`], within `budget` bytes of device memory.
     pub fn prepare_within(
         context: &Context,
         stage: &Stage<'_>,
         settings: Settings,
         budget: u64,
+    ) -> Result<Self, ExplicitError> {
+        Self::prepare_by(context, stage, settings, budget, &[])
+    }
+
+    fn prepare_by(
+        context: &Context,
+        stage: &Stage<'_>,
+        settings: Settings,
+        budget: u64,
+        helpers: &[Helper],
     ) -> Result<Self, ExplicitError> {
         let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
         let sizes = Sizes::new(context, &topology, stage.world.light_count, &settings, budget)?;
@@ -142,9 +173,16 @@ impl ExplicitVisibility {
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
         let outcomes = Outcomes::new(context, elements.count, settings.rays_per_element.get())?;
-        let links = linking::build(context, stage, &settings, &elements, &outcomes, &sizes)?;
+        let linked = Linked { settings: &settings, elements: &elements, outcomes: &outcomes, sizes: &sizes };
+        let (links, device_elements) = match helpers {
+            [] => (linking::build(context, stage, linked)?, Vec::new()),
+            helpers => devices::build(context, stage, linked, helpers)?,
+        };
         let mut method = Self {
-            report: Report::new(context, &settings, &elements, &emitters, &links, &outcomes)?,
+            report: Report {
+                device_elements,
+                ..Report::new(context, &settings, &elements, &emitters, &links, &outcomes)?
+            },
             state: State::new(context, &elements, stage.world.light_count, sizes.shadow_rays())?,
             environment: linking::averaged_environment(context, stage.environment, settings.rays_per_element)?,
             settings,
@@ -153,6 +191,7 @@ impl ExplicitVisibility {
             emitters,
             links,
             outcomes,
+            ages: asynchronous::Ages::default(),
         };
         let mut recorder = context.recorder("explicit-visibility")?;
         method.trace_emitters(&mut recorder, stage);
@@ -169,7 +208,10 @@ impl ExplicitVisibility {
         recorder.submit()?;
         // The old links go first: two sets may not fit.
         self.links.clear();
-        self.links = linking::build(context, stage, &self.settings, &self.elements, &self.outcomes, &self.sizes)?;
+        let (settings, elements) = (&self.settings, &self.elements);
+        let linked = Linked { settings, elements, outcomes: &self.outcomes, sizes: &self.sizes };
+        self.links = linking::build(context, stage, linked)?;
+        self.ages.renew();
         self.report =
             Report::new(context, &self.settings, &self.elements, &self.emitters, &self.links, &self.outcomes)?;
         let mut recorder = context.recorder("explicit-visibility")?;

@@ -37,6 +37,8 @@ pub struct Report {
     /// Shadow rays to emitters and to punctual lights.
     pub emitter_rays: u64,
     pub light_rays: u64,
+    /// Elements whose links each device made, the main one first; empty where it made all.
+    pub device_elements: Vec<u32>,
 }
 
 impl fmt::Display for Report {
@@ -89,6 +91,7 @@ impl Report {
             emitter_samples: emitters.plan.samples.len() as u32,
             emitter_rays: 0,
             light_rays: 0,
+            device_elements: Vec::new(),
         })
     }
 }
