@@ -158,7 +158,14 @@ impl Plan<'_> {
             return Err(AppError::Usage(message.into()));
         }
         let variation = choice.iter().map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(" ");
-        let global = Global { validate: self.global.validate || cli.global.validate, ..cli.global };
+        let own = self.global.clone();
+        let global = Global {
+            validate: own.validate || cli.global.validate,
+            gpu_timeout: cli.global.gpu_timeout.or(own.gpu_timeout),
+            crash_file: cli.global.crash_file.or(own.crash_file),
+            lose_device_at: cli.global.lose_device_at.or(own.lose_device_at),
+            ..cli.global
+        };
         Ok(Run { request, variation, command, global })
     }
 }
@@ -211,7 +218,15 @@ mod tests {
         Plan { methods, variations, set, options, global: &GLOBAL }
     }
 
-    const GLOBAL: Global = Global { gpu: None, validate: false, quiet: false, verbose: 0 };
+    const GLOBAL: Global = Global {
+        gpu: None,
+        validate: false,
+        gpu_timeout: None,
+        crash_file: None,
+        lose_device_at: None,
+        quiet: false,
+        verbose: 0,
+    };
 
     fn texts(words: &[&str]) -> Vec<String> {
         words.iter().map(|word| (*word).to_owned()).collect()

@@ -265,7 +265,15 @@ fn parse(line: &str, folder: &Path, global: &Global) -> Result<[Run; 2], AppErro
 mod tests {
     use super::*;
 
-    const GLOBAL: Global = Global { gpu: None, validate: false, quiet: false, verbose: 0 };
+    const GLOBAL: Global = Global {
+        gpu: None,
+        validate: false,
+        gpu_timeout: None,
+        crash_file: None,
+        lose_device_at: None,
+        quiet: false,
+        verbose: 0,
+    };
 
     #[test]
     fn every_run_of_every_row_is_understood() {
