@@ -4,7 +4,7 @@
 #include "lib/unit.glsl"
 
 // One thread per leaf: centre, vector area and extent of its vertex's cell, a third of each triangle around; and the rectangle
-// along its shortest edge that has the same second moments.
+// along its shortest edge that has the same area and whose second moments are in the same proportion.
 // reads positions, normals [vertex_count] (m, unit), triangles, incident_offsets[vertex_count + 1], incident_triangles
 // updates leaves[leaf_count], nodes (of leaves)   shared none
 layout(local_size_x = 64) in;
@@ -78,6 +78,9 @@ void main()
         }
     }
     vec2 sides = area_sum > 0.0 ? sqrt(3.0 * moments / area_sum) : vec2(0.0);
+    // Of the same area: the cells of a grid are hexagons, whose rectangles are then the grid's, and tile as the cells do.
+    float covered = 4.0 * sides.x * sides.y;
+    if (covered > 0.0) sides *= sqrt(area_sum / covered);
 
     leaves[leaf].normal = normal;
     leaves[leaf].area = length(vector_area);

@@ -238,6 +238,15 @@ pub const PAPERS: &[Paper] = &[
         doi: None,
     },
     Paper {
+        key: "Kreutzer2014",
+        title: "A Unified Sparse Matrix Data Format for Efficient General Sparse Matrix-Vector Multiplication on Modern \
+                Processors with Wide SIMD Units",
+        authors: "Moritz Kreutzer, Georg Hager, Gerhard Wellein, Holger Fehske, Alan R. Bishop",
+        year: 2014,
+        venue: "SIAM Journal on Scientific Computing 36(5)",
+        doi: Some("10.1137/130930352"),
+    },
+    Paper {
         key: "Mann1947",
         title: "On a Test of Whether one of Two Random Variables is Stochastically Larger than the Other",
         authors: "Henry B. Mann, Donald R. Whitney",

@@ -21,6 +21,7 @@ pub mod gltf;
 pub mod pose;
 pub mod rigid;
 pub mod shapes;
+pub mod facets;
 pub mod surfaces;
 pub mod tessellate;
 

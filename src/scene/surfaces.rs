@@ -115,12 +115,12 @@ impl Surfaces {
 }
 
 /// Sets joined two by two.
-struct Disjoint {
+pub(super) struct Disjoint {
     parents: Vec<u32>,
 }
 
 impl Disjoint {
-    fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self { parents: (0..count as u32).collect() }
     }
 
@@ -134,14 +134,14 @@ impl Disjoint {
         item
     }
 
-    fn join(&mut self, a: u32, b: u32) {
+    pub(super) fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
         // The lower index stays root, so that numbers follow first members.
         self.parents[a.max(b) as usize] = a.min(b);
     }
 
     /// Set of each item, numbered in order of first members, and their count.
-    fn numbered(mut self) -> (Vec<u32>, usize) {
+    pub(super) fn numbered(mut self) -> (Vec<u32>, usize) {
         let mut numbers = vec![0u32; self.parents.len()];
         let mut count = 0;
         for item in 0..self.parents.len() as u32 {

@@ -1,8 +1,8 @@
 //! A hierarchy over leaf elements: one leaf per vertex of a mesh, inner nodes of up to four children, depth-first order.
 //!
 //! A leaf stands for both sides of its vertex's cell and sits at the cell's centre of area, so that no two leaves of
-//! neighbouring walls coincide on their common edge. Surfaces are kept apart first: a node above one surface alone holds
-//! the leaves of one wall, as a quadtree where it is flat. The topology is made once ([`HierarchyPlan`]); places, areas
+//! neighbouring walls coincide on their common edge. Facets are kept apart first: a node above one facet alone holds
+//! leaves that look the same way, as a quadtree where they lie in a plane. The topology is made once ([`HierarchyPlan`]); places, areas
 //! and radii follow the world on the device ([`Hierarchy::place`]).
 
 use super::elements::{BACK_SIDE, Elements, NO_ELEMENT};
@@ -11,6 +11,7 @@ use super::world::World;
 use crate::gpu::shaders::hierarchy as passes;
 use crate::gpu::shaders::types::{HierarchyLeaf, HierarchyNode};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::facets::Facets;
 use crate::scene::surfaces::Surfaces;
 use glam::Vec3;
 
@@ -54,6 +55,7 @@ impl HierarchyPlan {
     pub fn new(
         elements: &Elements,
         surfaces: &Surfaces,
+        facets: &Facets,
         positions: &[Vec3],
         behind: Behind,
         margin: impl Fn(u32) -> f32,
@@ -62,18 +64,18 @@ impl HierarchyPlan {
         let vertices: Vec<u32> = (0..topology.back_elements.len() as u32)
             .filter(|&vertex| !topology.incident.row(vertex).is_empty())
             .collect();
-        let mut by_surface: Vec<Vec<u32>> = vec![Vec::new(); surfaces.is_flat.len()];
+        let mut by_facet: Vec<Vec<u32>> = vec![Vec::new(); facets.is_flat.len()];
         for &vertex in &vertices {
-            by_surface[surfaces.of_vertex[vertex as usize] as usize].push(vertex);
+            by_facet[facets.of_vertex[vertex as usize] as usize].push(vertex);
         }
-        by_surface.retain(|surface| !surface.is_empty());
-        let centers: Vec<Vec3> = by_surface
+        by_facet.retain(|facet| !facet.is_empty());
+        let centers: Vec<Vec3> = by_facet
             .iter()
-            .map(|surface| surface.iter().map(|&v| positions[v as usize]).sum::<Vec3>() / surface.len() as f32)
+            .map(|facet| facet.iter().map(|&v| positions[v as usize]).sum::<Vec3>() / facet.len() as f32)
             .collect();
 
         let mut plan = Self { leaf_of_element: vec![NONE; topology.vertices.len()], ..Self::default() };
-        let mut order: Vec<u32> = (0..by_surface.len() as u32).collect();
+        let mut order: Vec<u32> = (0..by_facet.len() as u32).collect();
         let mut make = Maker { plan: &mut plan, positions };
         let mut leaf = |plan: &mut Self, vertex: u32| {
             let surface = surfaces.of_vertex[vertex as usize];
@@ -90,7 +92,8 @@ impl HierarchyPlan {
             let node = plan.nodes.last_mut().expect("a leaf is added to its node");
             node.leaf = plan.leaves.len() as u32;
             node.shape = node.leaf;
-            node.surface = if surfaces.is_flat[surface as usize] { surface } else { NONE };
+            let facet = facets.of_vertex[vertex as usize];
+            node.surface = if facets.is_flat[facet as usize] { facet } else { NONE };
             node.margin = margin(vertex);
             plan.leaf_of_element[vertex as usize] = node.leaf;
             if back_element != NO_ELEMENT {
@@ -107,14 +110,14 @@ impl HierarchyPlan {
             });
         };
         if !order.is_empty() {
-            make.surfaces(&mut order, &centers, &mut by_surface, (NONE, 0), &mut leaf);
+            make.facets(&mut order, &centers, &mut by_facet, (NONE, 0), &mut leaf);
         }
-        plan.share_upwards();
+        plan.share_upwards(facets);
         plan
     }
 
     /// Inner nodes take over what all their children share.
-    fn share_upwards(&mut self) {
+    fn share_upwards(&mut self, facets: &Facets) {
         for node in (0..self.nodes.len() as u32).rev() {
             if self.nodes[node as usize].leaf != NONE {
                 continue;
@@ -123,9 +126,12 @@ impl HierarchyPlan {
             let first = self.nodes[children[0] as usize].surface;
             let same = children.iter().all(|&child| self.nodes[child as usize].surface == first);
             let margin = children.iter().map(|&child| self.nodes[child as usize].margin).fold(0.0, f32::max);
-            let shape = self.nodes[children[0] as usize].shape;
+            let shape = match facets.middle.get(first as usize) {
+                Some(&middle) if same => self.leaf_of_element[middle as usize],
+                _ => NONE,
+            };
             let inner = &mut self.nodes[node as usize];
-            inner.shape = if same && first != NONE { shape } else { NONE };
+            inner.shape = shape;
             inner.surface = if same { first } else { NONE };
             inner.margin = margin;
         }
@@ -177,27 +183,27 @@ impl Maker<'_> {
         self.plan.nodes[node as usize].skip = self.plan.nodes.len() as u32;
     }
 
-    /// The subtree of several surfaces.
-    fn surfaces(
+    /// The subtree of several facets.
+    fn facets(
         &mut self,
         order: &mut [u32],
         centers: &[Vec3],
-        by_surface: &mut [Vec<u32>],
+        by_facet: &mut [Vec<u32>],
         above: (u32, u32),
         leaf: &mut impl FnMut(&mut HierarchyPlan, u32),
     ) {
-        if let [surface] = *order {
-            let mut vertices = std::mem::take(&mut by_surface[surface as usize]);
+        if let [facet] = *order {
+            let mut vertices = std::mem::take(&mut by_facet[facet as usize]);
             return self.vertices(&mut vertices, above, leaf);
         }
         let node = self.open(above);
         for part in quarters(order, centers, above.1) {
-            self.surfaces(part, centers, by_surface, (node, above.1 + 1), leaf);
+            self.facets(part, centers, by_facet, (node, above.1 + 1), leaf);
         }
         self.close(node);
     }
 
-    /// The subtree of leaves of one surface.
+    /// The subtree of leaves of one facet.
     fn vertices(&mut self, vertices: &mut [u32], above: (u32, u32), leaf: &mut impl FnMut(&mut HierarchyPlan, u32)) {
         let node = self.open(above);
         if let [vertex] = *vertices {

@@ -4,8 +4,9 @@ use super::hierarchy::{Hierarchy, NONE};
 use crate::gpu::shaders::hierarchy::{PlaceSplats, PlaceSplatsParams};
 use crate::gpu::shaders::types::Splat;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::facets::Facets;
 use crate::scene::geometry::Geometry;
-use crate::scene::surfaces::Surfaces;
+
 
 /// Splats on the device, and which surface each triangle belongs to.
 pub struct Splats {
@@ -21,15 +22,15 @@ impl Splats {
     pub fn new(
         context: &Context,
         hierarchy: &Hierarchy,
-        surfaces: &Surfaces,
+        facets: &Facets,
         geometry: &Geometry,
     ) -> Result<Self, GpuError> {
         let plan = &hierarchy.plan;
         let is_flat = |leaf: u32| plan.nodes[plan.leaves[leaf as usize].node as usize].surface != NONE;
         let leaves: Vec<u32> = (0..hierarchy.leaf_count()).filter(|&leaf| is_flat(leaf)).collect();
-        let surface_of = |&[corner, ..]: &[u32; 3]| {
-            let surface = surfaces.of_vertex[corner as usize];
-            if surfaces.is_flat[surface as usize] { surface } else { NONE }
+        let surface_of = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|vertex| facets.of_vertex[vertex as usize]);
+            if a == b && b == c && facets.is_flat[a as usize] { a } else { NONE }
         };
         let triangle_surfaces: Vec<u32> = geometry.triangles.iter().map(surface_of).collect();
         let splats = Self {

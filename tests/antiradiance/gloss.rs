@@ -3,7 +3,7 @@
 use crate::common::TestContext;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::Fixture;
-use crate::support::{entries, prepare, settings, solve};
+use crate::support::{by_node, entries, prepare, settings, solve};
 use crate::twins;
 use glam::{DVec3, UVec2, Vec3, Vec4};
 use linklight::gpu::shaders::types::{HierarchyLeaf, LeafGloss};
@@ -93,10 +93,10 @@ impl State {
             lobes: context.download(&tables.gloss.lobes).unwrap(),
             directions: method.bins().bins.directions.clone(),
             norms: context.download(&tables.cosine_norms).unwrap(),
-            incident: entries(context, &tables.incident),
+            incident: entries(context, &tables.incident, tables.bin_count),
             parents: nodes.iter().map(|node| node.parent).collect(),
             means: context.download(&tables.means).unwrap(),
-            peaks: context.download(&tables.peaks).unwrap(),
+            peaks: by_node(&context.download(&tables.peaks).unwrap(), tables.bin_count),
         }
     }
 

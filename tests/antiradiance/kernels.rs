@@ -2,7 +2,7 @@
 
 use crate::common::TestContext;
 use crate::fixture::{Fixture, builtin_scene};
-use crate::support::{entries, prepare, settings};
+use crate::support::{by_node, entries, prepare, settings};
 use crate::twins::{self, Transferring};
 use glam::{DVec3, Vec3};
 use linklight::gpu::Options;
@@ -93,10 +93,10 @@ fn a_step_agrees_with_its_twin() {
         let norms = context.download(&tables.cosine_norms).unwrap();
         let albedo = context.download(&method.elements().albedo).unwrap();
         let source = context.download(&tables.source).unwrap();
-        let before = entries(&context, &tables.exitant);
+        let before = entries(&context, &tables.exitant, tables.bin_count);
         let transfers = method.transfers().download(&context).unwrap();
         let means = context.download(&tables.means).unwrap();
-        let peaks = context.download(&tables.peaks).unwrap();
+        let peaks = by_node(&context.download(&tables.peaks).unwrap(), tables.bin_count);
 
         let mut recorder = context.recorder("test").unwrap();
         let step = LocalStep { reflects: true, ..LocalStep::default() };
@@ -120,7 +120,7 @@ fn a_step_agrees_with_its_twin() {
             expected[row].copy_from_slice(&twin.exitant);
         }
         twins::pull(&nodes, m as u32, &mut expected);
-        let found = entries(&context, &tables.exitant);
+        let found = entries(&context, &tables.exitant, tables.bin_count);
         assert!(difference(&found, &expected) < 2e-5, "{}", difference(&found, &expected));
         let found_irradiance = context.download(&tables.irradiance).unwrap();
         assert!(difference(&found_irradiance, &irradiance) < 2e-5);

@@ -56,14 +56,18 @@ fn cell(vertex: u32, positions: &[Vec3], triangles: &[[u32; 3]]) -> Place {
     let edges = around.iter().flatten().map(|corner| *corner - own).filter(|edge| edge.length_squared() > 0.0);
     let shortest = edges.min_by(|a, b| a.length_squared().total_cmp(&b.length_squared())).unwrap();
     let along = shortest.reject_from(normal).normalize();
-    let rectangle = [along, normal.cross(along)].map(|axis| {
+    let axes = [along, normal.cross(along)];
+    let squares = axes.map(|axis| {
         let moment = |part: &[DVec3; 3]| {
             let [a, b, c] = part.map(|corner| (corner - center).dot(axis));
             area(part) / 6.0 * (a * a + b * b + c * c + a * b + b * c + c * a)
         };
-        3.0 * parts.iter().map(moment).sum::<f64>() / total * outer(axis)
+        3.0 * parts.iter().map(moment).sum::<f64>() / total
     });
-    Place { center, vector_area, rectangle: rectangle[0] + rectangle[1] }
+    // The same area.
+    let scale = total / (4.0 * (squares[0] * squares[1]).sqrt());
+    let rectangle = scale * (squares[0] * outer(axes[0]) + squares[1] * outer(axes[1]));
+    Place { center, vector_area, rectangle }
 }
 
 #[test]

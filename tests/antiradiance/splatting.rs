@@ -62,11 +62,11 @@ fn splats_reproduce_even_and_linear_light() {
         if from_edge > 0.01 {
             assert!((even[index].x * std::f32::consts::PI / 0.5 - 2.0).abs() < 1e-4, "{at}: {}", even[index].x);
         }
-        // Patches at the edge are half as wide as the others; cells of vertices are hexagons, not quite their rectangles.
+        // Patches at the edge are half as wide as the others.
         if from_edge > 1.0 {
             inner += 1;
             let found = sloped[index].x * std::f32::consts::PI / 0.5;
-            assert!((found - linear(at)).abs() < 0.06, "{at}: {found} for {}", linear(at));
+            assert!((found - linear(at)).abs() < 2e-3, "{at}: {found} for {}", linear(at));
         }
     }
     assert!(inner > 100, "{inner}");

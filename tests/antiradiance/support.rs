@@ -35,11 +35,19 @@ pub fn solve(context: &TestContext, method: &mut Antiradiance, fixture: &Fixture
     }
 }
 
-/// A table of f32 entries.
-pub fn entries(context: &TestContext, words: &linklight::gpu::Buffer<u64>) -> Vec<Vec3> {
+/// A table of f32 entries, node by node.
+pub fn entries(context: &TestContext, words: &linklight::gpu::Buffer<u64>, bin_count: u32) -> Vec<Vec3> {
     let words = context.download(words).unwrap();
     let halves = |word: u64| [word as u32, (word >> 32) as u32].map(f32::from_bits);
-    words.chunks(2).map(|pair| (halves(pair[0]), halves(pair[1])[0])).map(|([r, g], b)| Vec3::new(r, g, b)).collect()
+    let by_bin: Vec<Vec3> =
+        words.chunks(2).map(|pair| (halves(pair[0]), halves(pair[1])[0])).map(|([r, g], b)| Vec3::new(r, g, b)).collect();
+    by_node(&by_bin, bin_count)
+}
+
+/// A table that stands bin by bin, node by node (or leaf by leaf).
+pub fn by_node<T: Copy>(table: &[T], bin_count: u32) -> Vec<T> {
+    let (bins, nodes) = (bin_count as usize, table.len() / bin_count as usize);
+    (0..table.len()).map(|k| table[k % bins * nodes + k / bins]).collect()
 }
 
 /// sqrt(sum of squared differences over sum of squares).

@@ -4,10 +4,10 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per link, both of its directions: writes what they transfer to the receivers of one window.
+// One thread per link, both of its directions: writes what they transfer into the bins of one window.
 // reads links, nodes, leaves, cosine_norms, bin_directions, spread_offsets, spread
-// updates cell_offsets[node_count * bin_count + 1]: in, the start of each cell; out, its end
-// writes transfers[window] (sender * bin_count + bin, weight), in any order within a cell   shared none
+// updates cells[bin_count * node_count]: in, the place of each cell's first transfer; out, one beyond its last
+// writes transfers[window] (sender's entry of a table, weight), in any order within a cell   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Links { uvec2 links[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
@@ -16,22 +16,26 @@ layout(set = 0, binding = 3, scalar) readonly buffer CosineNorms { float cosine_
 layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer SpreadOffsets { uint spread_offsets[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Spread { SpreadEntry spread[]; };
-layout(set = 0, binding = 7, scalar) buffer CellOffsets { uint cell_offsets[]; };
+layout(set = 0, binding = 7, scalar) buffer Cells { uint cells[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Transfers { uint64_t transfers[]; };
 layout(push_constant, scalar) uniform Params {
     BinParams bins;
     uint link_count;
-    uint first_receiver;    // of the window
-    uint end_receiver;
+    uint node_count;
+    uint first_bin;         // of the window
+    uint end_bin;
     uint first_transfer;    // of the window, among all
 } params;
 
+#include "methods/antiradiance/slices.glsl"
 #include "methods/antiradiance/transfers.glsl"
 
 void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight)
 {
-    uint slot = atomicAdd(cell_offsets[receiver * params.bins.count + receiver_bin], 1);
-    transfers[slot - params.first_transfer] = packUint2x32(uvec2(sender * params.bins.count + sender_bin, floatBitsToUint(weight)));
+    if (receiver_bin < params.first_bin || receiver_bin >= params.end_bin) return;
+    uint place = atomicAdd(cells[receiver_bin * params.node_count + receiver], SLICE);
+    transfers[place - params.first_transfer] =
+        packUint2x32(uvec2(sender_bin * params.node_count + sender, floatBitsToUint(weight)));
 }
 
 void main()
@@ -39,6 +43,6 @@ void main()
     uint i = linear_index();
     if (i >= params.link_count) return;
     uvec2 link = links[i];
-    if (link.y >= params.first_receiver && link.y < params.end_receiver) transfers_of(link.x, link.y);
-    if (link.x >= params.first_receiver && link.x < params.end_receiver) transfers_of(link.y, link.x);
+    transfers_of(link.x, link.y);
+    transfers_of(link.y, link.x);
 }

@@ -1,22 +1,24 @@
 #version 460
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
+#include "lib/hierarchy.glsl"
 
 // One thread per cell (a bin of a receiver) that anything reaches: incident radiance along its transfers.   [Dachsbacher2007 4.2 global pass]
-// reads work[work_count] (cells of a window; long ones first, so that neighbouring threads take as long), cell_offsets[node_count * bin_count + 1] (ends of cells), transfers[window], exitant[node_count * bin_count]
-// (W m^-2 sr^-1: intensity per area)   writes incident[node_count * bin_count] (radiance, W m^-2 sr^-1)   shared none
+// reads work[] (cells by slices, or NONE), slice_offsets[slice_count + 1], transfers[window], exitant[bin_count * node_count]
+// (W m^-2 sr^-1: intensity per area)   writes incident[bin_count * node_count] (radiance, W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
-layout(set = 0, binding = 0, scalar) readonly buffer CellOffsets { uint cell_offsets[]; };
+layout(set = 0, binding = 0, scalar) readonly buffer SliceOffsets { uint slice_offsets[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Transfers { uint64_t transfers[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Exitant { uint64_t exitant[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Work { uint work[]; };
 layout(push_constant, scalar) uniform Params {
-    uint work_count;
-    uint first_transfer;    // of the window, among all
+    uint first_slice;       // of the window
+    uint slice_count;
 } params;
 
+#include "methods/antiradiance/slices.glsl"
 #include "methods/antiradiance/table.glsl"
 
 vec3 carried(uint k)
@@ -28,12 +30,14 @@ vec3 carried(uint k)
 void main()
 {
     uint i = linear_index();
-    if (i >= params.work_count) return;
-    uint cell = work[i];
-    uint k = (cell == 0 ? 0 : cell_offsets[cell - 1]) - params.first_transfer;
-    uint last = cell_offsets[cell] - params.first_transfer;
+    if (i >= params.slice_count * SLICE) return;
+    uint slice = params.first_slice + i / SLICE, lane = i % SLICE, first_transfer = slice_offsets[params.first_slice];
+    uint k = slice_offsets[slice] - first_transfer + lane, last = slice_offsets[slice + 1] - first_transfer;
+    // What a shorter cell than its neighbours has at its end weighs nothing.
     vec3 sum = vec3(0.0);
-    for (; k + 4 <= last; k += 4) sum += carried(k) + carried(k + 1) + carried(k + 2) + carried(k + 3);
-    for (; k < last; ++k) sum += carried(k);
-    STORE_ENTRY(incident, cell, sum);
+    for (; k + 3 * SLICE < last; k += 4 * SLICE)
+        sum += carried(k) + carried(k + SLICE) + carried(k + 2 * SLICE) + carried(k + 3 * SLICE);
+    for (; k < last; k += SLICE) sum += carried(k);
+    uint cell = work[slice * SLICE + lane];
+    if (cell != NONE) STORE_ENTRY(incident, cell, sum);
 }

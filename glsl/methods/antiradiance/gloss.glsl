@@ -2,7 +2,7 @@
 #define GLOSS
 // Specular reflection of a leaf towards a direction, from its incident bins.
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
-// means, peaks, has params.undershoot, and defines
+// means, peaks, has params.node_count, params.leaf_count and params.undershoot, and defines
 //     vec3 beside(uint bin)       radiance that arrives beside what the table holds
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
@@ -23,7 +23,8 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
     if (side < 0.0 && (own.flags & REFLECTS_BEHIND) == 0) return vec3(0.0);
     vec3 normal = side * own.normal;
     Surface s = glossy_surface(gloss[leaf], normal);
-    uint parent = nodes[own.node].parent, row = own.node * BIN_COUNT;
+    uint parent = nodes[own.node].parent;
+    vec3 mean = means[2 * leaf + (side > 0.0 ? 0 : 1)];
 
     vec3 sum = vec3(0.0), weights = vec3(0.0);
     for (uint bin = 0; bin < BIN_COUNT; ++bin) {
@@ -31,12 +32,13 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
         float cosine = dot(normal, w);
         if (cosine > 0.0) continue;
         vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
-        vec3 arriving = LOAD_ENTRY(incident, row + bin);
-        if (parent != NONE) arriving += LOAD_ENTRY(incident, parent * BIN_COUNT + bin);
-        sum += weight * max(arriving + beside(bin), lowest_in(leaf, side > 0.0 ? 0 : 1, bin, params.undershoot));
+        vec3 arriving = LOAD_ENTRY(incident, entry_of(own.node, bin, params.node_count));
+        if (parent != NONE) arriving += LOAD_ENTRY(incident, entry_of(parent, bin, params.node_count));
+        float peak = peaks[bin * params.leaf_count + leaf];
+        sum += weight * max(arriving + beside(bin), lowest_of(peak, mean, params.undershoot));
         weights += weight;
     }
-    vec3 mean = sum / max(weights, vec3(1e-20));
-    return max(specular_albedo(s, dot(normal, to_eye)) * mean, vec3(0.0));
+    vec3 within = sum / max(weights, vec3(1e-20));
+    return max(specular_albedo(s, dot(normal, to_eye)) * within, vec3(0.0));
 }
 #endif

@@ -3,9 +3,9 @@
 #include "lib/prelude.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per (inner node of one level, bin): exitant intensity per area from the children's.
+// One thread per inner node of one level and eighth of the bins: exitant intensity per area from the children's.
 //                                                                                               [Dachsbacher2007 4.2 pull]
-// reads level_nodes, nodes   updates exitant[node_count * BIN_COUNT] (W m^-2 sr^-1); the level below is already done   shared none
+// reads level_nodes, nodes   updates exitant[BIN_COUNT * node_count] (W m^-2 sr^-1); the level below is already done   shared none
 // Differs from [Dachsbacher2007]: per area, a mean in place of a sum, so that f16 has digits for small and large nodes alike.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -13,23 +13,36 @@ layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer LevelNodes { uint level_nodes[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 2, scalar) buffer Exitant { uint64_t exitant[]; };
-layout(push_constant, scalar) uniform Params { uint first; uint count; } params;
+layout(push_constant, scalar) uniform Params { uint first; uint count; uint node_count; } params;
 
 #include "methods/antiradiance/table.glsl"
 
+const uint SWEEP_PARTS = 8;     // threads of a node; as many workgroups in y
+const uint MAX_CHILDREN = 4;
+
 void main()
 {
-    uint i = linear_index();
-    if (i >= params.count * BIN_COUNT) return;
-    uint node = level_nodes[params.first + i / BIN_COUNT], bin = i % BIN_COUNT;
+    uint i = gl_GlobalInvocationID.x, part = gl_WorkGroupID.y;
+    if (i >= params.count) return;
+    uint node = level_nodes[params.first + i];
 
-    vec3 sum = vec3(0.0);
-    float area = 0.0;
-    uint end = nodes[node].skip;
-    for (uint child = node + 1; child < end; child = nodes[child].skip) {
-        sum += nodes[child].area * LOAD_ENTRY(exitant, child * BIN_COUNT + bin);
-        area += nodes[child].area;
+    // A missing child is the first one, of no weight.
+    uint end = nodes[node].skip, child = node + 1;
+    uvec4 children = uvec4(child);
+    vec4 weights = vec4(0.0);
+    for (uint k = 0; k < MAX_CHILDREN && child < end; ++k) {
+        children[k] = child;
+        weights[k] = nodes[child].area;
+        child = nodes[child].skip;
     }
-    vec3 mean = area > 0.0 ? sum / area : vec3(0.0);
-    STORE_ENTRY(exitant, node * BIN_COUNT + bin, mean);
+    float area = weights.x + weights.y + weights.z + weights.w;
+    if (area > 0.0) weights /= area;
+
+    uint last_bin = (part + 1) * BIN_COUNT / SWEEP_PARTS;
+    for (uint bin = part * BIN_COUNT / SWEEP_PARTS; bin < last_bin; ++bin) {
+        uvec4 entries = children + bin * params.node_count;
+        vec3 mean = weights.x * LOAD_ENTRY(exitant, entries.x) + weights.y * LOAD_ENTRY(exitant, entries.y)
+                    + weights.z * LOAD_ENTRY(exitant, entries.z) + weights.w * LOAD_ENTRY(exitant, entries.w);
+        STORE_ENTRY(exitant, entry_of(node, bin, params.node_count), mean);
+    }
 }

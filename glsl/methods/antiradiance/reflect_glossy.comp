@@ -24,6 +24,8 @@ layout(set = 0, binding = 10, scalar) readonly buffer Environment { vec3 environ
 layout(set = 0, binding = 11, scalar) readonly buffer Peaks { float peaks[]; };
 layout(push_constant, scalar) uniform Params {
     uint glossy_count;
+    uint leaf_count;
+    uint node_count;
     float undershoot;
     uint add_environment;   // 1: what arrives is beside the environment's own light
 } params;

@@ -1,8 +1,11 @@
 #ifndef TABLE
 #define TABLE
-// Entries of a table of colours, node by node and bin by bin: three f16 in 64 bits, or three f32 in twice that. Long words
-// make few loads, which is what these passes wait for.
+// Entries of a table of colours, bin by bin and node by node: three f16 in 64 bits, or three f32 in twice that. Long words
+// make few loads, which is what these passes wait for; what one bin's transfers read is a stretch that caches hold.
 // The kernel declares the specialisation constant WORDS (1 or 2 a entry) and arrays of uint64_t for the tables it binds.
+
+// Where a table of `node_count` nodes has a bin of a node.
+uint entry_of(uint node, uint bin, uint node_count) { return bin * node_count + node; }
 
 vec3 entry_of_words(uint64_t first, uint64_t second)
 {

@@ -27,7 +27,7 @@ layout(set = 0, binding = 10, scalar) readonly buffer Irradiance { vec3 irradian
 layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer Peaks { float peaks[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0.
-layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; float undershoot; } params;
+layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; uint leaf_count; uint node_count; float undershoot; } params;
 
 #include "methods/antiradiance/gloss.glsl"
 

@@ -95,6 +95,8 @@ impl Gloss {
             },
             params: passes::ReflectGlossyParams {
                 glossy_count: self.count,
+                leaf_count: hierarchy.leaf_count(),
+                node_count: hierarchy.node_count(),
                 undershoot: bounces * tables.undershoot,
                 add_environment: u32::from(has_environment),
             },
@@ -187,6 +189,8 @@ impl Antiradiance {
             params: passes::ToEyeParams {
                 eye: eye.to_array(),
                 glossy_count: gloss.count,
+                leaf_count: self.hierarchy.leaf_count(),
+                node_count: self.hierarchy.node_count(),
                 undershoot: self.bounced * tables.undershoot,
             },
         };

@@ -1,11 +1,16 @@
-//! Links between nodes, and what they transfer: sparse rows over (receiver, bin), built on the device.
+//! Links between nodes, and what they transfer: sparse rows over (bin, receiver), built on the device.
+//!
+//! A row is a cell: one bin of one receiver. Rows of one bin and of like length lie side by side in slices ([Kreutzer2014]),
+//! so that what threads side by side read lies side by side, and what a bin's rows read of the table stays in caches.
+//!
+//! [Kreutzer2014]: crate::methods::PAPERS
 
 use super::{Settings, Tables};
 use crate::gpu::shaders::methods::antiradiance as passes;
 use crate::gpu::shaders::types::{BinParams, PairCounters};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, Threads};
 use crate::stages::direction_bins::{DeviceBins, Spread};
-use crate::stages::hierarchy::Hierarchy;
+use crate::stages::hierarchy::{Hierarchy, NONE};
 use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
 use crate::stages::scan::{self, ScanScratch};
 use glam::UVec2;
@@ -14,9 +19,10 @@ use std::ops::Range;
 
 /// Pairs of one step of the queue.
 const QUEUE_BATCH: u32 = 8192;
-/// Classes of cells by length, and cells of one workgroup, in `work_classes.glsl` and its kernels.
-const WORK_CLASSES: usize = 16;
-const WORK_CELLS: u32 = 1024;
+/// Cells of a slice and classes of cells by length, in `slices.glsl`; nodes of one workgroup, in its kernels.
+const SLICE: u32 = 32;
+const LENGTH_CLASSES: usize = 48;
+const WORKGROUP_NODES: u32 = 1024;
 /// Links a leaf that a first attempt has room for.
 const FIRST_GUESS: u64 = 64;
 
@@ -32,7 +38,7 @@ pub enum LinkingError {
          (coarser links)"
     )]
     OutOfMemory { what: &'static str, needed: u64, available: u64 },
-    #[error("{0} transfers are more than 32 bits can count; lower --elements or bins, or raise refinement")]
+    #[error("{0} transfers are more than can be counted, or one bin's than one buffer holds; lower --elements or raise refinement")]
     TooMany(u64),
 }
 
@@ -89,36 +95,47 @@ impl NodeLinks {
     }
 }
 
-/// The transfers of consecutive receivers.
+/// The transfers of consecutive bins.
 pub struct TransferWindow {
-    pub first_node: u32,
-    pub node_count: u32,
+    pub bins: Range<u32>,
+    pub slices: Range<u32>,
     pub first_transfer: u32,
-    pub count: u32,
-    /// Sender's entry in a table (node x bins + bin), and the bits of the weight.
+    /// Sender's entry in a table (bin x nodes + node), and the bits of the weight; 0 where a cell has fewer than its slice.
     pub transfers: Buffer<u64>,
-    /// Cells with transfers, those with the most first.
-    pub work: Buffer<u32>,
 }
 
-/// Receivers of a window and its place among all transfers.
-type NodesAndTransfers = (Range<u32>, Range<u32>);
-
-/// What all links transfer, by receiver and bin.
+/// What all links transfer, by bin and receiver.
 pub struct Transfers {
-    /// End of each cell over all windows: cell = node x bins + bin. One entry more.
-    pub cell_offsets: Buffer<u32>,
+    /// Cells with transfers, bin by bin, those with the most first, slice by slice; [`NONE`] fills a bin's last slice.
+    pub work: Buffer<u32>,
+    /// Where each slice's transfers start over all windows. One entry more.
+    pub slice_offsets: Buffer<u32>,
+    /// Per cell, `bin x nodes + node`: one beyond the place of its last transfer.
+    cells: Buffer<u32>,
     pub windows: Vec<TransferWindow>,
+    /// Without what fills slices.
     pub count: u32,
+    node_count: u32,
+}
+
+/// What the kernels that make transfers read.
+struct Making<'a> {
+    links: &'a NodeLinks,
+    hierarchy: &'a Hierarchy,
+    bins: &'a DeviceBins,
+    cosine_norms: &'a Buffer<f32>,
+    params: BinParams,
 }
 
 impl Transfers {
     pub fn size_bytes(&self) -> u64 {
-        self.cell_offsets.size_bytes()
-            + self.windows.iter().map(|w| w.transfers.size_bytes() + w.work.size_bytes()).sum::<u64>()
+        self.work.size_bytes()
+            + self.slice_offsets.size_bytes()
+            + self.cells.size_bytes()
+            + self.windows.iter().map(|w| w.transfers.size_bytes()).sum::<u64>()
     }
 
-    /// Form factors of `links` where their nodes are now: count, prefix sum, fill, sort.       [Dachsbacher2007 3.1]
+    /// Form factors of `links` where their nodes are now: count, sort cells into slices, fill, sort.   [Dachsbacher2007 3.1]
     pub fn new(
         context: &Context,
         links: &NodeLinks,
@@ -128,186 +145,274 @@ impl Transfers {
         settings: &Settings,
         budget: u64,
     ) -> Result<Self, LinkingError> {
-        let bin_count = bins.bins.count();
-        let cells = hierarchy.node_count() as usize * bin_count as usize;
-        let cell_offsets = context.buffer("antiradiance/cell offsets", cells + 1)?;
-        let bin_params = BinParams {
+        let (node_count, bin_count) = (hierarchy.node_count(), bins.bins.count());
+        let params = BinParams {
             side: bins.bins.side,
             count: bin_count,
             class_count: if settings.spread == Spread::None { 0 } else { bins.bins.class_count() },
             is_gaussian: u32::from(settings.spread == Spread::Gaussian),
         };
-        let mut recorder = context.recorder("links")?;
-        recorder.fill(&cell_offsets, 0);
-        let count = passes::CountTransfers {
-            links: &links.pairs,
-            nodes: &hierarchy.nodes,
-            leaves: &hierarchy.leaves,
-            bin_directions: &bins.directions,
-            spread_offsets: &bins.spread_offsets,
-            spread: &bins.spread,
-            cell_offsets: &cell_offsets,
-            params: passes::CountTransfersParams { bins: bin_params, link_count: links.count },
-        };
-        recorder.dispatch(&count, links.count);
-        let scratch = ScanScratch::new(context, "antiradiance", cells + 1)?;
-        scan::exclusive(&mut recorder, &cell_offsets, cells + 1, &scratch);
-        recorder.submit()?;
-        let total = context.download_range(&cell_offsets, cells..cells + 1)?[0];
+        let making = Making { links, hierarchy, bins, cosine_norms, params };
+        let cells = context.buffer("antiradiance/cells", node_count as usize * bin_count as usize)?;
+        making.count(context, &cells)?;
 
-        let mut result = Self { cell_offsets, windows: Vec::new(), count: total };
-        let needed = u64::from(total) * size_of::<u64>() as u64;
+        let (counts, class_counts) = count_cells(context, &cells, node_count, bin_count)?;
+        let total: u64 = counts.iter().map(|bin| u64::from(bin[LENGTH_CLASSES])).sum();
         let available = budget.min(context.available_bytes());
-        if needed > available {
-            return Err(LinkingError::OutOfMemory { what: "transfers", needed, available });
-        }
-        for (nodes, transfers) in result.plan_windows(context, hierarchy.node_count(), bin_count)? {
+        check_transfers(total, available)?;
+        let (bin_slices, starts) = slices_of(&counts);
+        let slice_count = bin_slices[bin_count as usize];
+        let work = context.buffer("antiradiance/work", (slice_count * SLICE) as usize)?;
+        let slice_offsets = context.buffer("antiradiance/slice offsets", slice_count as usize + 1)?;
+        context.write(&class_counts, &starts)?;
+        list_cells(context, &cells, &class_counts, &work, &slice_offsets, node_count, bin_count)?;
+
+        let mut result = Self { work, slice_offsets, cells, windows: Vec::new(), count: total as u32, node_count };
+        let offsets = context.download(&result.slice_offsets)?;
+        let padded = u64::from(offsets[slice_count as usize]);
+        check_transfers(padded, available)?;
+        let ends: Vec<u32> = bin_slices.iter().map(|&slice| offsets[slice as usize]).collect();
+        for bins in plan_windows(&ends, context.limits().storage_buffer_bytes / size_of::<u64>() as u64)? {
+            let [first, end] = [bins.start, bins.end].map(|bin| ends[bin as usize]);
             let name = format!("antiradiance/transfers {}", result.windows.len());
-            let mut window = TransferWindow {
-                first_node: nodes.start,
-                node_count: nodes.len() as u32,
-                first_transfer: transfers.start,
-                count: transfers.len() as u32,
-                transfers: context.buffer(&name, transfers.len())?,
-                work: context.buffer("antiradiance/no work", 0)?,
+            let window = TransferWindow {
+                slices: bin_slices[bins.start as usize]..bin_slices[bins.end as usize],
+                bins,
+                first_transfer: first,
+                transfers: context.buffer(&name, (end - first) as usize)?,
             };
-            let fill = passes::FillTransfers {
-                links: &links.pairs,
-                nodes: &hierarchy.nodes,
-                leaves: &hierarchy.leaves,
-                cosine_norms,
-                bin_directions: &bins.directions,
-                spread_offsets: &bins.spread_offsets,
-                spread: &bins.spread,
-                cell_offsets: &result.cell_offsets,
-                transfers: &window.transfers,
-                params: passes::FillTransfersParams {
-                    bins: bin_params,
-                    link_count: links.count,
-                    first_receiver: nodes.start,
-                    end_receiver: nodes.end,
-                    first_transfer: transfers.start,
-                },
-            };
-            let mut recorder = context.recorder("links")?;
-            recorder.dispatch(&fill, links.count);
-            let sort = passes::SortTransfers {
-                cell_offsets: &result.cell_offsets,
-                transfers: &window.transfers,
-                params: passes::SortTransfersParams {
-                    first_cell: nodes.start * bin_count,
-                    cell_count: nodes.len() as u32 * bin_count,
-                    first_transfer: transfers.start,
-                },
-            };
-            recorder.dispatch(&sort, nodes.len() * bin_count as usize);
-            recorder.submit()?;
-            window.work = result.list_work(context, nodes.start * bin_count, nodes.len() as u32 * bin_count)?;
+            making.fill(context, &result, &window)?;
             result.windows.push(window);
         }
         Ok(result)
-    }
-
-    /// The cells with transfers, the longest first: threads side by side then have as much to do.
-    fn list_work(&self, context: &Context, first_cell: u32, cell_count: u32) -> Result<Buffer<u32>, GpuError> {
-        let class_counts = context.upload("antiradiance/work classes", &[0u32; WORK_CLASSES])?;
-        let threads = cell_count.div_ceil(WORK_CELLS) * passes::CountWork::PROGRAM.workgroup[0];
-        let mut recorder = context.recorder("links")?;
-        let count = passes::CountWork {
-            cell_offsets: &self.cell_offsets,
-            class_counts: &class_counts,
-            params: passes::CountWorkParams { first_cell, cell_count },
-        };
-        recorder.dispatch(&count, threads);
-        recorder.submit()?;
-        let counts = context.download(&class_counts)?;
-        let (mut total, mut starts) = (0, Vec::with_capacity(WORK_CLASSES));
-        for count in counts {
-            starts.push(total);
-            total += count;
-        }
-        context.write(&class_counts, &starts)?;
-        let work = context.buffer("antiradiance/work", total as usize)?;
-        let mut recorder = context.recorder("links")?;
-        let list = passes::ListWork {
-            cell_offsets: &self.cell_offsets,
-            class_counts: &class_counts,
-            work: &work,
-            params: passes::ListWorkParams { first_cell, cell_count },
-        };
-        recorder.dispatch(&list, threads);
-        recorder.submit()?;
-        Ok(work)
-    }
-
-    /// Ranges of (receivers, transfers), none larger than a pass can bind.
-    fn plan_windows(
-        &self,
-        context: &Context,
-        node_count: u32,
-        bin_count: u32,
-    ) -> Result<Vec<NodesAndTransfers>, LinkingError> {
-        let largest = context.limits().storage_buffer_bytes / size_of::<u64>() as u64;
-        if u64::from(self.count) <= largest {
-            return Ok(vec![(0..node_count, 0..self.count)]);
-        }
-        let offsets = context.download(&self.cell_offsets)?;
-        let start_of = |node: u32| offsets[node as usize * bin_count as usize];
-        let (mut windows, mut first) = (Vec::new(), 0);
-        while first < node_count {
-            let mut end = first + 1;
-            while end < node_count && u64::from(start_of(end + 1) - start_of(first)) <= largest {
-                end += 1;
-            }
-            let own = u64::from(start_of(end) - start_of(first));
-            if own > largest {
-                return Err(LinkingError::TooMany(own));
-            }
-            windows.push((first..end, start_of(first)..start_of(end)));
-            first = end;
-        }
-        Ok(windows)
     }
 
     /// `incident` from `exitant` along all transfers.                       [Dachsbacher2007 4.2, global pass]
     pub fn gather(&self, recorder: &mut Recorder<'_>, half: bool, exitant: &Buffer<u64>, incident: &Buffer<u64>) {
         recorder.fill(incident, 0);
         for window in &self.windows {
-            let work_count = window.work.len() as u32;
+            let (first_slice, slice_count) = (window.slices.start, window.slices.len() as u32);
             let pass = passes::Gather {
-                cell_offsets: &self.cell_offsets,
+                slice_offsets: &self.slice_offsets,
                 transfers: &window.transfers,
-                work: &window.work,
+                work: &self.work,
                 exitant,
                 incident,
                 constants: passes::GatherConstants { words: Tables::words(half) as u32 },
-                params: passes::GatherParams { work_count, first_transfer: window.first_transfer },
+                params: passes::GatherParams { first_slice, slice_count },
             };
-            recorder.dispatch(&pass, work_count);
+            recorder.dispatch(&pass, slice_count * SLICE);
         }
     }
 
-    /// All transfers: (receiver's cell, sender's entry, weight), in order of cells.
+    /// All transfers: (receiver x bins + bin, sender x bins + bin, weight), in that order.
     pub fn download(&self, context: &Context) -> Result<Vec<(u32, u32, f32)>, GpuError> {
-        let ends = context.download(&self.cell_offsets)?;
-        let mut words = Vec::with_capacity(self.count as usize);
+        let work = context.download(&self.work)?;
+        let offsets = context.download(&self.slice_offsets)?;
+        let ends = context.download(&self.cells)?;
+        let bin_count = ends.len() as u32 / self.node_count.max(1);
+        let by_node = |entry: u32| entry % self.node_count * bin_count + entry / self.node_count;
+        let mut all = Vec::with_capacity(self.count as usize);
         for window in &self.windows {
-            words.extend(context.download(&window.transfers)?);
+            let words = context.download(&window.transfers)?;
+            for slot in window.slices.start * SLICE..window.slices.end * SLICE {
+                let cell = work[slot as usize];
+                if cell == NONE {
+                    continue;
+                }
+                let start = offsets[(slot / SLICE) as usize] + slot % SLICE;
+                all.extend((start..ends[cell as usize]).step_by(SLICE as usize).map(|place| {
+                    let word = words[(place - window.first_transfer) as usize];
+                    (by_node(cell), by_node(word as u32), f32::from_bits((word >> 32) as u32))
+                }));
+            }
         }
-        let mut first = 0;
-        let mut all = Vec::with_capacity(words.len());
-        for (cell, &end) in ends.iter().take(ends.len() - 1).enumerate() {
-            all.extend((first..end).map(|k| {
-                let word = words[k as usize];
-                (cell as u32, word as u32, f32::from_bits((word >> 32) as u32))
-            }));
-            first = end;
-        }
+        all.sort_unstable_by_key(|&(cell, entry, _)| (cell, entry));
         Ok(all)
     }
+}
+
+impl Making<'_> {
+    /// Transfers of each cell.
+    fn count(&self, context: &Context, cells: &Buffer<u32>) -> Result<(), GpuError> {
+        let (hierarchy, bins) = (self.hierarchy, self.bins);
+        let pass = passes::CountTransfers {
+            links: &self.links.pairs,
+            nodes: &hierarchy.nodes,
+            leaves: &hierarchy.leaves,
+            bin_directions: &bins.directions,
+            spread_offsets: &bins.spread_offsets,
+            spread: &bins.spread,
+            cells,
+            params: passes::CountTransfersParams {
+                bins: self.params,
+                link_count: self.links.count,
+                node_count: hierarchy.node_count(),
+            },
+        };
+        let mut recorder = context.recorder("links")?;
+        recorder.fill(cells, 0);
+        recorder.dispatch(&pass, self.links.count);
+        recorder.submit()
+    }
+
+    /// The transfers of a window, by rising sender within each cell.
+    fn fill(&self, context: &Context, made: &Transfers, window: &TransferWindow) -> Result<(), GpuError> {
+        let (hierarchy, bins) = (self.hierarchy, self.bins);
+        let fill = passes::FillTransfers {
+            links: &self.links.pairs,
+            nodes: &hierarchy.nodes,
+            leaves: &hierarchy.leaves,
+            cosine_norms: self.cosine_norms,
+            bin_directions: &bins.directions,
+            spread_offsets: &bins.spread_offsets,
+            spread: &bins.spread,
+            cells: &made.cells,
+            transfers: &window.transfers,
+            params: passes::FillTransfersParams {
+                bins: self.params,
+                link_count: self.links.count,
+                node_count: hierarchy.node_count(),
+                first_bin: window.bins.start,
+                end_bin: window.bins.end,
+                first_transfer: window.first_transfer,
+            },
+        };
+        let slice_count = window.slices.len() as u32;
+        let sort = passes::SortTransfers {
+            work: &made.work,
+            slice_offsets: &made.slice_offsets,
+            cells: &made.cells,
+            transfers: &window.transfers,
+            params: passes::SortTransfersParams { first_slice: window.slices.start, slice_count },
+        };
+        let mut recorder = context.recorder("links")?;
+        recorder.fill(&window.transfers, 0);
+        recorder.dispatch(&fill, self.links.count);
+        recorder.dispatch(&sort, slice_count * SLICE);
+        recorder.submit()
+    }
+}
+
+/// Per bin: cells of each class of length, and transfers; and the device's table of them.
+type CellCounts = (Vec<[u32; LENGTH_CLASSES + 1]>, Buffer<u32>);
+
+fn count_cells(
+    context: &Context,
+    cells: &Buffer<u32>,
+    node_count: u32,
+    bin_count: u32,
+) -> Result<CellCounts, GpuError> {
+    let class_counts = context.buffer("antiradiance/class counts", bin_count as usize * (LENGTH_CLASSES + 1))?;
+    let mut recorder = context.recorder("links")?;
+    recorder.fill(&class_counts, 0);
+    let count =
+        passes::CountCells { cells, class_counts: &class_counts, params: passes::CountCellsParams { node_count } };
+    recorder.dispatch(&count, workgroup_a_bin(node_count, bin_count));
+    recorder.submit()?;
+    let words = context.download(&class_counts)?;
+    Ok((words.as_chunks().0.to_vec(), class_counts))
+}
+
+/// A workgroup of 64 threads per [`WORKGROUP_NODES`] nodes and bin.
+fn workgroup_a_bin(node_count: u32, bin_count: u32) -> Threads {
+    Threads::Grid(64 * node_count.div_ceil(WORKGROUP_NODES), bin_count, 1)
+}
+
+/// Cells sorted into slices, how long those are, and where each cell's transfers start (into `cells`).
+fn list_cells(
+    context: &Context,
+    cells: &Buffer<u32>,
+    class_counts: &Buffer<u32>,
+    work: &Buffer<u32>,
+    slice_offsets: &Buffer<u32>,
+    node_count: u32,
+    bin_count: u32,
+) -> Result<(), GpuError> {
+    let scratch = ScanScratch::new(context, "antiradiance", slice_offsets.len())?;
+    let slot_count = work.len() as u32;
+    let mut recorder = context.recorder("links")?;
+    recorder.fill(work, NONE);
+    let list = passes::ListCells { cells, class_counts, work, params: passes::ListCellsParams { node_count } };
+    recorder.dispatch(&list, workgroup_a_bin(node_count, bin_count));
+    let slice_count = slot_count / SLICE;
+    let measure =
+        passes::MeasureSlices { work, cells, slice_offsets, params: passes::MeasureSlicesParams { slice_count } };
+    recorder.dispatch(&measure, slice_count);
+    scan::exclusive(&mut recorder, slice_offsets, slice_offsets.len(), &scratch);
+    let place = passes::PlaceCells { work, slice_offsets, cells, params: passes::PlaceCellsParams { slot_count } };
+    recorder.dispatch(&place, slot_count);
+    recorder.submit()
+}
+
+/// The first slice of each bin and one beyond the last's; and where in the list of cells each class of each bin starts.
+fn slices_of(counts: &[[u32; LENGTH_CLASSES + 1]]) -> (Vec<u32>, Vec<u32>) {
+    let (mut bin_slices, mut starts) = (vec![0], Vec::with_capacity(counts.len() * (LENGTH_CLASSES + 1)));
+    let mut slices = 0;
+    for bin in counts {
+        let mut next = slices * SLICE;
+        for count in &bin[..LENGTH_CLASSES] {
+            starts.push(next);
+            next += count;
+        }
+        starts.push(0);
+        slices = next.div_ceil(SLICE);
+        bin_slices.push(slices);
+    }
+    (bin_slices, starts)
+}
+
+/// Refuses more transfers than can be counted, or than there is memory for.
+fn check_transfers(count: u64, available: u64) -> Result<(), LinkingError> {
+    // Half of what 32 bits count: slices add less than that.
+    if count > u64::from(u32::MAX / 2) {
+        return Err(LinkingError::TooMany(count));
+    }
+    let needed = count * size_of::<u64>() as u64;
+    if needed > available {
+        return Err(LinkingError::OutOfMemory { what: "transfers", needed, available });
+    }
+    Ok(())
+}
+
+/// Ranges of bins whose transfers (`ends`: where each bin's start, one more) fit into `largest`.
+fn plan_windows(ends: &[u32], largest: u64) -> Result<Vec<Range<u32>>, LinkingError> {
+    let count_of = |bins: &Range<u32>| u64::from(ends[bins.end as usize] - ends[bins.start as usize]);
+    let bin_count = ends.len() as u32 - 1;
+    let (mut windows, mut first) = (Vec::new(), 0);
+    while first < bin_count {
+        let mut own = first..first + 1;
+        if count_of(&own) > largest {
+            return Err(LinkingError::TooMany(count_of(&own)));
+        }
+        while own.end < bin_count && count_of(&(first..own.end + 1)) <= largest {
+            own.end += 1;
+        }
+        first = own.end;
+        windows.push(own);
+    }
+    Ok(windows)
 }
 
 /// Solid angle that a node of a link may have, of a bin's.
 pub fn link_solid_angle(settings: &Settings) -> f32 {
     settings.refinement * 4.0 * PI / settings.bins.get() as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_and_windows_end_with_bins() {
+        let mut counts = [[0; LENGTH_CLASSES + 1]; 3];
+        (counts[0][0], counts[0][5], counts[2][1]) = (33, 40, 1);
+        let (bin_slices, starts) = slices_of(&counts);
+        assert_eq!(bin_slices, [0, 3, 3, 4]);
+        assert_eq!((starts[0], starts[1], starts[5], starts[6]), (0, 33, 33, 73));
+        assert_eq!(starts[2 * (LENGTH_CLASSES + 1) + 1], 3 * SLICE);
+        assert_eq!(plan_windows(&[0, 10, 20, 45], 25).unwrap(), [0..2, 2..3]);
+        assert_eq!(plan_windows(&[0, 10, 20, 45], 100).unwrap(), vec![0..3]);
+        assert!(matches!(plan_windows(&[0, 10, 20, 45], 24), Err(LinkingError::TooMany(25))));
+    }
 }

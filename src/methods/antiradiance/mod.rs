@@ -57,6 +57,7 @@ pub use super::explicit_visibility::Stage;
 use crate::gpu::shaders::methods::antiradiance as passes;
 use crate::gpu::shaders::types::Ray;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::scene::facets::Facets;
 use crate::scene::surfaces::Surfaces;
 use crate::stages::direction_bins::DeviceBins;
 use crate::stages::elements::{ElementTopology, Elements};
@@ -151,6 +152,7 @@ impl Antiradiance {
         let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
 
         let surfaces = Surfaces::new(stage.geometry, stage.rest_positions);
+        let facets = Facets::new(stage.geometry, stage.rest_positions, &surfaces);
         let behind = match settings.backs {
             Backs::Open => Behind::BlockOpen,
             Backs::All => Behind::BlockAll,
@@ -161,10 +163,10 @@ impl Antiradiance {
             let part = stage.geometry.vertex_part[vertex as usize];
             if moves[part as usize] { settings.motion_margin } else { 0.0 }
         };
-        let plan = HierarchyPlan::new(&elements, &surfaces, stage.rest_positions, behind, margin);
+        let plan = HierarchyPlan::new(&elements, &surfaces, &facets, stage.rest_positions, behind, margin);
         let budget = check_memory(context, &plan, &settings, budget)?;
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
-        let splats = Splats::new(context, &hierarchy, &surfaces, stage.geometry)?;
+        let splats = Splats::new(context, &hierarchy, &facets, stage.geometry)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
         let (bin_count, threshold) = (settings.bins.get(), settings.gloss_threshold);
         let gloss = Gloss::new(context, &hierarchy, &elements, stage.world, threshold, bin_count)?;

@@ -14,6 +14,8 @@ const GROWTH_STEPS: usize = 4;
 const LEAST_CHANGE: f64 = 1e-3;
 /// Share of a step below which the symmetric scheme gives up.
 const LEAST_DAMPING: f32 = 1.0 / 16.0;
+/// Steps of antiradiance alone that may rise unwatched: as many as surfaces stand one behind the other, errors grow first.
+const FREE_STEPS: usize = 8;
 /// Bounds what [`LocalStep::bounced`] grows to.
 const MOST_BOUNCED: f64 = 1e6;
 
@@ -63,6 +65,11 @@ fn is_rising(residuals: &[Residual]) -> bool {
     }
 }
 
+/// The last step of each bounce.
+fn bounce_ends(residuals: &[Residual]) -> Vec<Residual> {
+    residuals.chunk_by(|a, b| a.bounce == b.bounce).filter_map(|own| own.last().copied()).collect()
+}
+
 impl Antiradiance {
     /// Direct light of linked emitters and of the environment, into `linked`.
     pub(super) fn solve_linked(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
@@ -79,7 +86,7 @@ impl Antiradiance {
         });
         recorder.submit()?;
         watch.step("antiradiance, direct light", 0, 1)?;
-        self.bounced = 1.0;
+        (self.bounced, self.damping) = (1.0, self.settings.damping);
         self.settle(context, 0, has_environment)?;
         let mut recorder = context.recorder("antiradiance")?;
         recorder.copy(&self.tables.irradiance, &self.tables.linked);
@@ -107,9 +114,14 @@ impl Antiradiance {
             Scheme::Symmetric => self.iterate(context, watch),
             Scheme::Asymmetric => {
                 self.start(context)?;
+                let mut first = self.residuals.len();
                 for bounce in 1..=bounces {
                     watch.step("antiradiance", u64::from(bounce) - 1, bounces.into())?;
                     self.settle(context, bounce, false)?;
+                    // Bounces of few steps hand on what has not settled.
+                    if is_rising(&bounce_ends(&self.residuals[first..])) && self.damp() {
+                        first = self.residuals.len();
+                    }
                     // The last of the steps that settle antiradiance is also what the next bounce reflects.
                     if bounce < bounces {
                         self.reflect(context)?;
@@ -125,7 +137,7 @@ impl Antiradiance {
         let mut recorder = context.recorder("antiradiance")?;
         self.tables.start(&mut recorder, &self.hierarchy, &self.bins, &self.elements, false);
         recorder.submit()?;
-        self.bounced = 1.0;
+        (self.bounced, self.damping) = (1.0, self.settings.damping);
         self.source_power = self.sum_residuals(context)?[2];
         Ok(())
     }
@@ -134,7 +146,6 @@ impl Antiradiance {
     /// Differs from [Dachsbacher2007]: damped where needed, which brings every iteration to rest whose eigenvalues have
     /// real parts below one; plain steps need magnitudes below one.
     fn iterate(&mut self, context: &Context, watch: &dyn Watch) -> Result<(), AntiradianceError> {
-        self.damping = self.settings.damping;
         self.start(context)?;
         let mut first = self.residuals.len();
         for iteration in 1..=self.settings.iterations {
@@ -148,24 +159,37 @@ impl Antiradiance {
                 continue;
             }
             let rate = spectral_radius(own, damping);
-            if self.damping <= LEAST_DAMPING {
+            if !self.damp() {
                 return Err(AntiradianceError::Growth { steps: iteration, rate, scheme: "symmetric" });
             }
-            (self.damping, first) = ((0.5 * self.damping).max(LEAST_DAMPING), self.residuals.len());
-            let damping = self.damping;
-            tracing::info!("changes grow by {rate:.2} a step after {iteration} steps; damped by {damping}");
+            first = self.residuals.len();
         }
         Ok(())
     }
 
+    /// Halves the share of steps; `false` where it is as small as it may be.
+    fn damp(&mut self) -> bool {
+        let may = self.damping > LEAST_DAMPING;
+        self.damping = (0.5 * self.damping).max(LEAST_DAMPING);
+        if may {
+            tracing::info!("changes grow after {} steps; damped by {}", self.residuals.len(), self.damping);
+        }
+        may
+    }
+
     /// Moves antiradiance on until it changes no more, light being what it is.            [Dachsbacher2007 Eq. 14]
+    /// Differs from [Dachsbacher2007]: damped as the symmetric scheme is, where it goes on to swing.
     fn settle(&mut self, context: &Context, bounce: u32, has_environment: bool) -> Result<(), AntiradianceError> {
+        let mut first = self.residuals.len() + FREE_STEPS;
         for step in 0..self.settings.depth {
-            let sets_floor = bounce <= 1 && step == 0;
-            let step = LocalStep { has_environment, sets_floor, bounced: self.bounced, ..LocalStep::default() };
+            let (sets_floor, bounced, damping) = (bounce <= 1 && step == 0, self.bounced, self.damping);
+            let step = LocalStep { has_environment, sets_floor, bounced, damping, ..LocalStep::default() };
             let residual = self.step_once(context, bounce, step)?;
             if residual.relative() < f64::from(self.settings.tolerance) {
                 break;
+            }
+            if self.residuals.get(first..).is_some_and(is_rising) && self.damp() {
+                first = self.residuals.len();
             }
         }
         Ok(())
@@ -175,7 +199,7 @@ impl Antiradiance {
     fn reflect(&mut self, context: &Context) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         recorder.scope("reflect", |recorder| {
-            self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements, self.bounced);
+            self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements, (self.bounced, self.damping));
         });
         recorder.submit()?;
         let power = self.sum_residuals(context)?[2];
@@ -227,7 +251,7 @@ impl Antiradiance {
         }
         Err(AntiradianceError::Growth {
             steps: last.step,
-            rate: spectral_radius(&self.residuals, if last.reflects { self.damping } else { 1.0 }),
+            rate: spectral_radius(&self.residuals, self.damping),
             scheme: match self.settings.scheme {
                 Scheme::Symmetric => "symmetric",
                 Scheme::Asymmetric => "asymmetric",
@@ -252,6 +276,13 @@ mod tests {
         assert!(is_rising(&residuals(&[3.0, 1.0, 3.1, 1.1, 3.2])));
         assert!(!is_rising(&residuals(&[1.0, 2.0, 3.0, 4.0])), "too few to tell");
         assert!(!is_rising(&residuals(&[1e-5, 2e-5, 3e-5, 4e-5, 5e-5])), "rounding");
+    }
+
+    #[test]
+    fn a_bounce_ends_with_its_last_step() {
+        let mut steps = residuals(&[5.0, 4.0, 3.0, 2.0, 1.0]);
+        steps.iter_mut().zip([1, 1, 2, 3, 3]).for_each(|(step, bounce)| step.bounce = bounce);
+        assert_eq!(bounce_ends(&steps).iter().map(|end| end.change).collect::<Vec<_>>(), [4.0, 3.0, 1.0]);
     }
 
     #[test]

@@ -37,7 +37,7 @@ crate::settings! {
         scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
         /// Steps of the symmetric scheme.
         iterations: u32 = 8, range 1..=1000, unit "steps", paper "4 (8 for the finest pictures)";
-        /// Share of each step that the symmetric scheme takes; it halves this, down to 1/16, where the light grows.
+        /// Share of each step that is taken; halved, down to 1/16, where changes grow.
         damping: f32 = 1.0, range 0.0625..=1.0, paper "1";
         /// Steps for antiradiance to settle, per bounce, at most: surfaces one behind the other that light crosses.
         depth: u32 = 8, range 1..=1000, unit "steps", paper "the scene's depth complexity";

@@ -3,17 +3,19 @@
 use super::gloss::Gloss;
 use super::linking::Transfers;
 use crate::gpu::shaders::methods::antiradiance as passes;
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, Threads};
 use crate::scene::environment::Environment;
 use crate::stages::direction_bins::{DeviceBins, DirectionBins};
 use crate::stages::elements::Elements;
 use crate::stages::hierarchy::Hierarchy;
 use glam::{Vec2, Vec3};
 
-/// Threads of a leaf in `local.comp`.
-const LOCAL_LANES: u32 = 8;
+/// Threads of a leaf in `local.glsl`, and of an inner node in `push.comp` and `pull.comp`.
+pub(super) const LOCAL_PARTS: u32 = 4;
+const SWEEP_PARTS: u32 = 8;
 
-/// Light by node and direction, and by leaf and side. Entry of a table: `node * bins + bin`, [`Tables::words`] words of 64 bits.
+/// Light by direction and node, and by leaf and side. Entry of a table: `bin * nodes + node`, [`Tables::words`] words of 64
+/// bits.
 pub struct Tables {
     pub bin_count: u32,
     /// Entries are three f16, else three f32.
@@ -34,15 +36,18 @@ pub struct Tables {
     pub radiosity: Buffer<Vec3>,
     /// Mean radiance that arrived before anything was taken away, W m^-2 sr^-1.
     pub means: Buffer<Vec3>,
-    /// Per leaf and bin: what arrived so in the bin, of the mean of its side.
+    /// Per bin and leaf: what arrived so in the bin, of the mean of its side.
     pub peaks: Buffer<f32>,
     /// What arrived last.
     pub irradiance: Buffer<Vec3>,
+    /// The same, front and back of each quarter of the bins in turn.
+    irradiance_parts: Buffer<Vec3>,
     /// Direct light of linked emitters and of the environment.
     pub linked: Buffer<Vec3>,
     /// The leaves with specular lobes, and what those send.
     pub gloss: Gloss,
-    /// Per leaf, W: change of the exitant light in the last step, its sum, and what of it is reflected and emitted.
+    /// Per quarter of the bins and leaf, W: change of the exitant light in the last step, its sum, and what of it is reflected
+    /// and emitted.
     pub residuals: Buffer<Vec3>,
 }
 
@@ -106,7 +111,8 @@ impl Tables {
             irradiance: context.buffer("antiradiance/irradiance", sides)?,
             linked: context.buffer("antiradiance/linked irradiance", sides)?,
             peaks: context.buffer("antiradiance/peaks", leaves * bin_count as usize)?,
-            residuals: context.buffer("antiradiance/residuals", leaves)?,
+            irradiance_parts: context.buffer("antiradiance/irradiance parts", sides * LOCAL_PARTS as usize)?,
+            residuals: context.buffer("antiradiance/residuals", leaves * LOCAL_PARTS as usize)?,
         })
     }
 
@@ -169,9 +175,10 @@ impl Tables {
         hierarchy: &Hierarchy,
         bins: &DeviceBins,
         elements: &Elements,
-        bounced: f32,
+        (bounced, damping): (f32, f32),
     ) {
-        self.local(recorder, hierarchy, bins, elements, LocalStep { reflects: true, bounced, ..LocalStep::default() });
+        let step = LocalStep { reflects: true, bounced, damping, ..LocalStep::default() };
+        self.local(recorder, hierarchy, bins, elements, step);
     }
 
     fn push(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
@@ -184,9 +191,13 @@ impl Tables {
                 nodes: &hierarchy.nodes,
                 incident: &self.incident,
                 constants: passes::PushConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
-                params: passes::PushParams { first: level.start, count: level.len() as u32 },
+                params: passes::PushParams {
+                    first: level.start,
+                    count: level.len() as u32,
+                    node_count: hierarchy.node_count(),
+                },
             };
-            recorder.dispatch(&pass, level.len() * self.bin_count as usize);
+            recorder.dispatch(&pass, Threads::Grid(level.len() as u32, SWEEP_PARTS, 1));
         });
     }
 
@@ -202,48 +213,77 @@ impl Tables {
             recorder
                 .scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
         }
-        let leaf_count = hierarchy.leaf_count();
-        let pass = passes::Local {
+        let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
+        let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
+        let undershoot = step.bounced * self.undershoot;
+        let (sets_floor, add_environment) = (u32::from(step.sets_floor), u32::from(step.has_environment));
+        let irradiance = passes::LocalIrradiance {
             leaves: &hierarchy.leaves,
             nodes: &hierarchy.nodes,
             cosine_norms: &self.cosine_norms,
             bin_directions: &bins.directions,
             incident: &self.incident,
             environment: &self.environment,
+            means: &self.means,
+            peaks: &self.peaks,
+            parts: &self.irradiance_parts,
+            constants: passes::LocalIrradianceConstants { words, bin_count },
+            params: passes::LocalIrradianceParams { leaf_count, node_count, sets_floor, undershoot, add_environment },
+        };
+        let reflect = passes::LocalReflect {
+            parts: &self.irradiance_parts,
+            leaves: &hierarchy.leaves,
             source: &self.source,
             albedo: &elements.albedo,
             radiosity: &self.radiosity,
-            exitant: &self.exitant,
+            means: &self.means,
+            irradiance: &self.irradiance,
+            params: passes::LocalReflectParams {
+                leaf_count,
+                part_count: LOCAL_PARTS,
+                update_radiosity: u32::from(step.reflects),
+                sets_floor,
+            },
+        };
+        let exitant = passes::LocalExitant {
+            leaves: &hierarchy.leaves,
+            nodes: &hierarchy.nodes,
+            cosine_norms: &self.cosine_norms,
+            bin_directions: &bins.directions,
+            incident: &self.incident,
+            environment: &self.environment,
+            radiosity: &self.radiosity,
             means: &self.means,
             peaks: &self.peaks,
             glossy_of_leaf: &self.gloss.glossy_of_leaf,
             specular: &self.gloss.specular,
-            irradiance: &self.irradiance,
+            exitant: &self.exitant,
             residuals: &self.residuals,
-            constants: passes::LocalConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
-            params: passes::LocalParams {
+            constants: passes::LocalExitantConstants { words, bin_count },
+            params: passes::LocalExitantParams {
                 leaf_count,
-                update_radiosity: u32::from(step.reflects),
-                sets_floor: u32::from(step.sets_floor),
-                undershoot: step.bounced * self.undershoot,
+                node_count,
+                sets_floor,
+                undershoot,
                 damping: step.damping,
-                add_environment: u32::from(step.has_environment),
+                add_environment,
             },
         };
-        recorder.scope("local", |recorder| recorder.dispatch(&pass, leaf_count * LOCAL_LANES));
+        recorder.scope("local", |recorder| {
+            recorder.dispatch(&irradiance, Threads::Grid(leaf_count, LOCAL_PARTS, 1));
+            recorder.dispatch(&reflect, leaf_count);
+            recorder.dispatch(&exitant, Threads::Grid(leaf_count, LOCAL_PARTS, 1));
+        });
         recorder.scope("pull", |recorder| {
             hierarchy.levels.upwards(recorder, |recorder, level| {
                 let pass = passes::Pull {
                     level_nodes: &hierarchy.levels.nodes,
                     nodes: &hierarchy.nodes,
                     exitant: &self.exitant,
-                    constants: passes::PullConstants {
-                        words: Self::words(self.half) as u32,
-                        bin_count: self.bin_count,
-                    },
-                    params: passes::PullParams { first: level.start, count: level.len() as u32 },
+                    constants: passes::PullConstants { words, bin_count },
+                    params: passes::PullParams { first: level.start, count: level.len() as u32, node_count },
                 };
-                recorder.dispatch(&pass, level.len() * self.bin_count as usize);
+                recorder.dispatch(&pass, Threads::Grid(level.len() as u32, SWEEP_PARTS, 1));
             });
         });
     }

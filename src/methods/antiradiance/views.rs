@@ -64,7 +64,8 @@ impl Antiradiance {
             }
             DebugView::Residual => {
                 let residuals = context.download(&self.tables.residuals)?;
-                for (leaf, residual) in plan.leaves.iter().zip(&residuals) {
+                for (index, leaf) in plan.leaves.iter().enumerate() {
+                    let residual: Vec3 = residuals.iter().skip(index).step_by(plan.leaves.len()).sum();
                     let share = if residual.y > 0.0 { residual.x / residual.y } else { 0.0 };
                     self.color_leaf(leaf.node, false_color::of_amount(share), &mut colors);
                 }
@@ -92,8 +93,9 @@ impl Antiradiance {
         let radiosity = context.download(&self.tables.radiosity)?;
         let words = Tables::words(self.tables.half) as usize;
         let table = context.download(&self.tables.exitant)?;
+        let plan_nodes = self.hierarchy.node_count() as usize;
         let sent = leaves.iter().zip(&norms).enumerate().map(|(index, (leaf, norm))| {
-            let at = (leaf.node as usize * bins.count() as usize + bin as usize) * words;
+            let at = (bin as usize * plan_nodes + leaf.node as usize) * words;
             let exitant = entry(&table[at..at + words]);
             let cosine = leaf.normal.dot(w);
             let held = norm * cosine.abs().max(0.5 / (bins.count() as f32).sqrt());

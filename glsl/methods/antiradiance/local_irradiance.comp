@@ -1,0 +1,57 @@
+#version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#include "lib/prelude.glsl"
+#include "lib/direction_bins.glsl"
+#include "lib/hierarchy.glsl"
+
+// One thread per leaf and quarter of the bins: irradiance of both sides.                          [Dachsbacher2007 4.2 local pass]
+// reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
+//       environment[BIN_COUNT] (W m^-2 sr^-1), means[2 leaf_count] (W m^-2 sr^-1), peaks[BIN_COUNT * leaf_count] (of the mean)
+// writes parts[LOCAL_PARTS * 2 * leaf_count] (W/m2, fronts and backs of a quarter one after the other)   shared none
+layout(local_size_x = 64) in;
+layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
+layout(constant_id = 1) const uint BIN_COUNT = 128;
+layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Incident { uint64_t incident[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Environment { vec3 environment[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Peaks { float peaks[]; };
+layout(set = 0, binding = 8, scalar) writeonly buffer Parts { vec3 parts[]; };
+layout(push_constant, scalar) uniform Params {
+    uint leaf_count;
+    uint node_count;
+    uint sets_floor;            // 1: what arrives now counts uncut, see floor.glsl
+    float undershoot;
+    uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
+} params;
+
+#include "methods/antiradiance/floor.glsl"
+#include "methods/antiradiance/local.glsl"
+#include "methods/antiradiance/table.glsl"
+
+void main()
+{
+    uint leaf = gl_GlobalInvocationID.x, part = gl_WorkGroupID.y;
+    if (leaf >= params.leaf_count) return;
+    HierarchyLeaf own = leaves[leaf];
+    uint parent = nodes[own.node].parent;
+    float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
+    vec3 mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
+
+    // What travels against the normal arrives at the front.
+    vec3 front = vec3(0.0), back = vec3(0.0);
+    for (uint bin = first_bin(part); bin < first_bin(part + 1); ++bin) {
+        float cosine = dot(own.normal, bin_directions[bin]);
+        vec3 arriving = arriving_in(own.node, parent, bin);
+        if (params.sets_floor == 0)
+            arriving = max(arriving, lowest_of(peaks[bin * params.leaf_count + leaf], cosine <= 0.0 ? mean_front : mean_back, params.undershoot));
+        arriving *= discrete_cosine(cosine, norm, BIN_COUNT) * bin_solid_angle;
+        if (cosine <= 0.0) front += arriving;
+        else back += arriving;
+    }
+    parts[2 * part * params.leaf_count + leaf] = front;
+    parts[(2 * part + 1) * params.leaf_count + leaf] = back;
+}
