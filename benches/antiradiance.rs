@@ -235,6 +235,7 @@ fn convergence(_: &mut Criterion) {
     let mut csv = "scene,scheme,step,bounce,reflects,change_w,total_w\n".to_owned();
     for (scene, elements) in [("cornell-box", 2_000), ("office", 7_000)] {
         let prepared = Prepared::new(&context, scene, elements);
+        let mut ends: Vec<Vec<Vec3>> = Vec::new();
         for (name, scheme) in [("symmetric", Scheme::Symmetric), ("asymmetric", Scheme::Asymmetric)] {
             let settings = Settings {
                 scheme,
@@ -242,6 +243,8 @@ fn convergence(_: &mut Criterion) {
                 // Four steps of antiradiance to one of light, as in the paper.
                 depth: 4,
                 tolerance: 0.0,
+                half_tables: false,
+                smoothing: false,
                 ..paper_settings(6.0)
             };
             let mut method = Antiradiance::prepare(&context, &prepared.stage(), settings).unwrap();
@@ -253,8 +256,13 @@ fn convergence(_: &mut Criterion) {
             }
             let last = steps.last().map_or(0.0, |r| r.relative());
             let ended = outcome.map_or_else(|error| error.to_string(), |()| format!("changes by {last:.1e} at last"));
-            println!("convergence, {scene}, {name}: {} steps, {ended}", steps.len());
+            println!("convergence, {scene}, {name}: {} steps, damped by {}, {ended}", steps.len(), method.damping());
+            ends.push(context.download(method.indirect_irradiance()).unwrap());
         }
+        let square = |a: &Vec3| f64::from(a.length_squared());
+        let apart: f64 = ends[0].iter().zip(&ends[1]).map(|(a, b)| square(&(*a - *b))).sum();
+        let apart = (apart / ends[0].iter().map(square).sum::<f64>()).sqrt();
+        println!("convergence, {scene}: the schemes' light differs by {apart:.1e} (paper: less than 1e-4)");
     }
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/target/antiradiance-convergence.csv");
     std::fs::write(file, csv).unwrap();

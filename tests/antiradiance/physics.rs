@@ -4,11 +4,12 @@ use crate::common::TestContext;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{prepare, settings, solve};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use linklight::methods::antiradiance::{AntiradianceError, Scheme, Settings};
 use linklight::scene::environment::{Environment, EnvironmentMap};
 use linklight::scene::pose::Pose;
-use linklight::scene::{LightKind, Material};
+use linklight::scene::shapes::Shape;
+use linklight::scene::{LightKind, Material, Primitive};
 use linklight::stages::emitters::EmitterChoice;
 use linklight::stages::work::Unwatched;
 use std::f32::consts::PI;
@@ -165,7 +166,7 @@ fn a_closed_door_leaks_little() {
 fn light_that_grows_is_refused() {
     let context = TestContext::new();
     let mut world = builtin_scene("furnace");
-    world.materials.iter_mut().for_each(|m| m.base_color = glam::Vec4::new(3.0, 3.0, 3.0, 1.0));
+    world.materials.iter_mut().for_each(|m| m.base_color = Vec4::new(3.0, 3.0, 3.0, 1.0));
     let fixture = Fixture::new(&context, world, Some(1.0));
     let settings = Settings { scheme: Scheme::Symmetric, iterations: 40, ..settings(128) };
     let mut method = prepare(&context, &fixture, settings);
@@ -200,13 +201,41 @@ fn a_thin_wall_shades_reflected_light() {
     assert!(lit > 0.0 && shaded < 0.05 * lit, "{shaded} behind, {lit} before");
 }
 
+/// A board with rounded edges, lit on one side and alone in the world: its mesh goes round the edges, its light does not.
+#[test]
+fn a_rounded_board_is_dark_behind() {
+    let context = TestContext::new();
+    let board = Shape::rounded_cuboid(Vec3::new(-2.0, 0.0, -0.1), Vec3::new(2.0, 2.0, 0.1), 0.015);
+    let primitive = Primitive {
+        tangents: vec![Vec4::new(1.0, 0.0, 0.0, 1.0); board.positions.len()],
+        colors: vec![Vec4::ONE; board.positions.len()],
+        uv: [board.uv.clone(), board.uv],
+        positions: board.positions,
+        normals: board.normals,
+        triangles: board.triangles,
+        ..Primitive::default()
+    };
+    let lamp = (light(LightKind::Point, 50.0), Vec3::new(0.3, 1.0, 2.0), Vec3::NEG_Z);
+    let fixture = Fixture::new(&context, scene(vec![one_sided(0.8)], vec![primitive], &[lamp]), Some(0.35));
+    let mut method = prepare(&context, &fixture, Settings { refinement: 3.0, ..settings(128) });
+    let solution = solve(&context, &mut method, &fixture, 1);
+    let punctual = context.download(method.punctual_irradiance()).unwrap();
+    let most = |values: &[Vec3], behind: bool| {
+        let there = fixture.rest_positions.iter().zip(values).filter(|(at, _)| (at.z < -0.099) == behind);
+        there.map(|(_, light)| light.x).fold(0.0, f32::max)
+    };
+    assert!(most(&punctual, false) > 5.0 && most(&punctual, true) == 0.0);
+    println!("behind a board lit by {:.1}: {:.2e} W/m2", most(&punctual, false), most(&solution.indirect, true));
+    assert!(most(&solution.indirect, true) == 0.0, "{}", most(&solution.indirect, true));
+}
+
 /// A closed room of rough metal that emits 1 everywhere: each bounce has what its lobes reflect of the one before.
 #[test]
 fn a_glossy_furnace_neither_makes_nor_loses_light() {
     let context = TestContext::new();
     let mut world = builtin_scene("furnace");
     for material in &mut world.materials {
-        material.base_color = glam::Vec4::new(0.5, 0.5, 0.5, 1.0);
+        material.base_color = Vec4::new(0.5, 0.5, 0.5, 1.0);
         (material.metallic, material.roughness, material.double_sided) = (1.0, 0.5, false);
     }
     let mut fixture = Fixture::new(&context, world, Some(0.75));

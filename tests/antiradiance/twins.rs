@@ -106,6 +106,12 @@ impl Transferring<'_> {
         if solid_angle <= 0.0 {
             return Vec::new();
         }
+        // A flat sender all of which lies behind a surface that nothing reaches from there.
+        if let (Some((normal, _, true)), Some(_)) = (p, q)
+            && normal.dot(offset) >= normal.dot(from.half_u).abs() + normal.dot(from.half_v).abs()
+        {
+            return Vec::new();
+        }
         let coverage = solid_angle / self.bins.solid_angle();
         let entry = |bin: u32, read: u32, weight: f32| (receiver * m + bin, sender * m + read, weight);
         let is_hidden = |v: Vec3| p.is_some_and(|(normal, _, passes_behind)| passes_behind && normal.dot(v) >= 0.0);

@@ -43,6 +43,5 @@ void main()
     uint i = linear_index();
     if (i >= params.link_count) return;
     uvec2 link = links[i];
-    transfers_of(link.x, link.y);
-    transfers_of(link.y, link.x);
+    for (uint direction = 0; direction < 2; ++direction) transfers_of(link[direction], link[1 - direction]);
 }

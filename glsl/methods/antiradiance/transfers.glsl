@@ -106,6 +106,9 @@ void transfers_of(uint sender, uint receiver)
     float q_cos = dot(q.normal, w);
     float solid_angle = q.is_flat ? disc_solid_angle(from.area * abs(q_cos) / squared) : from.area / squared;
     if (!(solid_angle > 0.0)) return;
+    // All of the sender lies behind a surface that nothing reaches from there.
+    if (passes_behind && q.is_flat
+        && dot(p.normal, offset) >= abs(dot(p.normal, from.half_u)) + abs(dot(p.normal, from.half_v))) return;
     float coverage = solid_angle * float(params.bins.count) / FOUR_PI;
 
     bool is_cone = params.bins.class_count > 0 && params.bins.is_gaussian == 0;
