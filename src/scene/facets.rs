@@ -82,7 +82,14 @@ impl Facets {
     }
 
     /// Flat parts of other surfaces; a vertex on an edge goes with the plane that has the most of its cell.
-    fn find_planes(&mut self, geometry: &Geometry, positions: &[Vec3], areas: &[Vec3], normals: &[Vec3], bends: &[bool]) {
+    fn find_planes(
+        &mut self,
+        geometry: &Geometry,
+        positions: &[Vec3],
+        areas: &[Vec3],
+        normals: &[Vec3],
+        bends: &[bool],
+    ) {
         let triangles = &geometry.triangles;
         let is_open = |vertex: u32| self.of_vertex[vertex as usize] == NONE && !bends[vertex as usize];
         let mut edges: Vec<([u32; 2], u32)> = triangles
@@ -218,8 +225,16 @@ mod tests {
     fn board() -> (Geometry, Vec<Vec3>) {
         // Cross-section of a board 2 m wide and .2 m thick, corners cut by 2 cm; open at the ends.
         let profile = [
-            (-1.0, -0.08), (-0.98, -0.1), (0.0, -0.1), (0.98, -0.1), (1.0, -0.08), (1.0, 0.08), (0.98, 0.1), (0.0, 0.1),
-            (-0.98, 0.1), (-1.0, 0.08),
+            (-1.0, -0.08),
+            (-0.98, -0.1),
+            (0.0, -0.1),
+            (0.98, -0.1),
+            (1.0, -0.08),
+            (1.0, 0.08),
+            (0.98, 0.1),
+            (0.0, 0.1),
+            (-0.98, 0.1),
+            (-1.0, 0.08),
         ];
         let mut positions = Vec::new();
         for z in 0..4 {

@@ -16,12 +16,12 @@ pub mod camera;
 pub mod charts;
 pub mod deform;
 pub mod environment;
+pub mod facets;
 pub mod geometry;
 pub mod gltf;
 pub mod pose;
 pub mod rigid;
 pub mod shapes;
-pub mod facets;
 pub mod surfaces;
 pub mod tessellate;
 

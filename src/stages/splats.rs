@@ -7,7 +7,6 @@ use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::facets::Facets;
 use crate::scene::geometry::Geometry;
 
-
 /// Splats on the device, and which surface each triangle belongs to.
 pub struct Splats {
     pub count: u32,

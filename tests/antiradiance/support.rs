@@ -39,8 +39,11 @@ pub fn solve(context: &TestContext, method: &mut Antiradiance, fixture: &Fixture
 pub fn entries(context: &TestContext, words: &linklight::gpu::Buffer<u64>, bin_count: u32) -> Vec<Vec3> {
     let words = context.download(words).unwrap();
     let halves = |word: u64| [word as u32, (word >> 32) as u32].map(f32::from_bits);
-    let by_bin: Vec<Vec3> =
-        words.chunks(2).map(|pair| (halves(pair[0]), halves(pair[1])[0])).map(|([r, g], b)| Vec3::new(r, g, b)).collect();
+    let by_bin: Vec<Vec3> = words
+        .chunks(2)
+        .map(|pair| (halves(pair[0]), halves(pair[1])[0]))
+        .map(|([r, g], b)| Vec3::new(r, g, b))
+        .collect();
     by_node(&by_bin, bin_count)
 }
 

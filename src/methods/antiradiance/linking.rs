@@ -38,7 +38,9 @@ pub enum LinkingError {
          (coarser links)"
     )]
     OutOfMemory { what: &'static str, needed: u64, available: u64 },
-    #[error("{0} transfers are more than can be counted, or one bin's than one buffer holds; lower --elements or raise refinement")]
+    #[error(
+        "{0} transfers are more than can be counted, or one bin's than one buffer holds; lower --elements or raise refinement"
+    )]
     TooMany(u64),
 }
 
