@@ -7,6 +7,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::MakeWriter;
 
+use super::AppError;
 use super::interrupt::Interrupt;
 use crate::stages::work::{Interrupted, Watch};
 
@@ -97,6 +98,21 @@ pub struct Watcher<'a> {
 impl<'a> Watcher<'a> {
     pub fn new(console: &'a Console, interrupt: &'a Interrupt) -> Self {
         Self { console, interrupt, bar: RefCell::new(None) }
+    }
+
+    /// What one run of many gave, or its error in words; the errors that end them all are passed on: no GPU, and the
+    /// user's Ctrl-C, which may come wrapped in an error of the work it ended.
+    pub fn attempt<T>(&self, result: Result<T, AppError>) -> Result<Result<T, String>, AppError> {
+        match result {
+            Ok(done) => Ok(Ok(done)),
+            Err(AppError::Partial(_)) => Err(Interrupted.into()),
+            Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => Err(error),
+            Err(error) => {
+                *self.bar.borrow_mut() = None;
+                self.interrupt.check()?;
+                Ok(Err(error.to_string()))
+            }
+        }
     }
 }
 

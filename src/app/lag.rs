@@ -82,15 +82,12 @@ pub fn run(
     for run in work {
         let (scene, method) = (run.request.scene.to_string(), run.request.method.key);
         let command = run.command.clone();
-        let row = match follow(&run, args, &watch) {
+        let row = match watch.attempt(follow(&run, args, &watch))? {
             Ok(Lag { frames, ms, differences }) => {
                 Row { scene, method, frames, ms, differences, command, failed: None }
             }
-            Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => return Err(error),
-            Err(error) => {
-                watch.step("lag", 1, 1)?;
-                let failed = Some(error.to_string());
-                Row { scene, method, frames: None, ms: None, differences: Vec::new(), command, failed }
+            Err(reason) => {
+                Row { scene, method, frames: None, ms: None, differences: Vec::new(), command, failed: Some(reason) }
             }
         };
         row.print(out)?;
@@ -149,30 +146,26 @@ fn follow(run: &Run, args: &LagArgs, watch: &dyn Watch) -> Result<Lag, AppError>
     method.frame(&context, request, &stage, &film, watch)?;
 
     change_lights(&context, &mut stage)?;
-    let mut pictures: Vec<(Picture, f64)> = Vec::new();
-    let expected = {
-        let mut fresh = frame::Method::prepare(&context, request, &stage, watch)?;
-        let picture = |film: &Film| frame::picture(&context, request, film);
-        let own_film = Film::new(&context, request.width, request.height)?;
-        fresh.frame(&context, request, &stage, &own_film, watch)?;
-        let expected = picture(&own_film)?;
-        let start = Instant::now();
-        for number in 0..args.frames {
-            watch.step("lag", number.into(), args.frames.into())?;
-            method.frame(&context, request, &stage, &film, watch)?;
-            let ms = milliseconds(start);
-            pictures.push((picture(&film)?, ms));
-            if difference(&pictures[pictures.len() - 1].0, &expected) <= args.within {
-                break;
-            }
+    let mut fresh = frame::Method::prepare(&context, request, &stage, watch)?;
+    let own_film = Film::new(&context, request.width, request.height)?;
+    fresh.frame(&context, request, &stage, &own_film, watch)?;
+    let expected = frame::picture(&context, request, &own_film)?;
+    let mut lag = Lag { frames: None, ms: None, differences: Vec::new() };
+    let start = Instant::now();
+    for number in 0..args.frames {
+        watch.step("lag", number.into(), args.frames.into())?;
+        method.frame(&context, request, &stage, &film, watch)?;
+        let ms = milliseconds(start);
+        let difference = difference(&frame::picture(&context, request, &film)?, &expected);
+        lag.differences.push(difference);
+        if difference <= args.within {
+            (lag.frames, lag.ms) = (Some(number + 1), Some(ms));
+            break;
         }
-        watch.step("lag", 1, 1)?;
-        expected
-    };
+    }
+    watch.step("lag", 1, 1)?;
     render::check_validation(&context)?;
-    let differences: Vec<f64> = pictures.iter().map(|(picture, _)| difference(picture, &expected)).collect();
-    let first = differences.iter().position(|difference| *difference <= args.within);
-    Ok(Lag { frames: first.map(|index| index as u32 + 1), ms: first.map(|index| pictures[index].1), differences })
+    Ok(lag)
 }
 
 /// Another colour and strength for every punctual light.

@@ -81,13 +81,9 @@ pub fn run(
     for (sides, wall_mm, run) in work {
         let method = run.request.method.key;
         let command = run.command.clone();
-        let (lit, dark, failed) = match means(&run, &watch) {
+        let (lit, dark, failed) = match watch.attempt(means(&run, &watch))? {
             Ok([lit, dark]) => (lit, dark, None),
-            Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => return Err(error),
-            Err(error) => {
-                watch.step("leak", 1, 1)?;
-                (0.0, 0.0, Some(error.to_string()))
-            }
+            Err(reason) => (0.0, 0.0, Some(reason)),
         };
         let leak = (failed.is_none() && lit > 0.0).then(|| dark / lit);
         let row = Row { method, sides, wall_mm, leak, lit, dark, command, failed };

@@ -22,7 +22,6 @@ use crate::report::errors::compare;
 use crate::report::image::{self, Metadata, Picture};
 use crate::report::tonemap::ToneSettings;
 use crate::report::{heat_map, write};
-use crate::stages::work::{Interrupted, Watch};
 
 pub use plan::Variation;
 use plan::{Plan, REFERENCE, Run};
@@ -164,20 +163,16 @@ impl Session<'_> {
         self.write(report)?;
         for run in runs {
             let Some(scene) = report.scenes.last_mut() else { return Ok(()) };
-            let outcome = match self.run(&run, &reference, &scene.reference.bounce_means) {
+            let outcome = match self.watch.attempt(self.run(&run, &reference, &scene.reference.bounce_means))? {
                 Ok(done) => {
                     let failed = self.args.fail_above.iter().filter(|limit| is_above(limit, &done.figures));
                     complaints
                         .extend(failed.map(|limit| format!("`{}`: {}", run.command, complaint(limit, &done.figures))));
                     Outcome::Done(Box::new(done))
                 }
-                Err(AppError::Partial(_)) => return Err(Interrupted.into()),
-                Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => return Err(error),
-                Err(error) => {
-                    // The user's Ctrl-C may come wrapped in an error of the work it ended.
-                    self.watch.step("compare", 1, 1)?;
-                    complaints.push(format!("`{}` failed: {error}", run.command));
-                    Outcome::Failed(error.to_string())
+                Err(reason) => {
+                    complaints.push(format!("`{}` failed: {reason}", run.command));
+                    Outcome::Failed(reason)
                 }
             };
             let method = run.request.method.key;

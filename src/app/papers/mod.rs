@@ -31,7 +31,6 @@ use crate::report::papers_page::{
 };
 use crate::report::tonemap::{ToneMap, ToneSettings};
 use crate::report::write::{FileError, write_text};
-use crate::stages::work::Watch;
 use row::{Held, Measurement, Ours, Row, Theirs};
 
 /// All rows, paper by paper.
@@ -154,14 +153,7 @@ impl Evidence<'_> {
             return Ok(());
         }
         tracing::info!("linklight render {line}");
-        let measured = match self.run(line, has_reference) {
-            Ok(measured) => Ok(measured),
-            Err(error @ (AppError::Interrupted(_) | AppError::NoGpu(_))) => return Err(error),
-            Err(error) => {
-                self.watch.step("papers", 1, 1)?;
-                Err(error.to_string())
-            }
-        };
+        let measured = self.watch.attempt(self.run(line, has_reference))?;
         self.measured.insert(line.to_owned(), measured);
         Ok(())
     }
