@@ -1,7 +1,7 @@
 //! Surface shadow maps and the final gather in one run, as ratios: look-ups in compressed maps against shadow rays between
 //! the same points, making maps against casting the same rays alone, gathers of pixels and of texels, memory.
 //!
-//! `LINKLIGHT_BENCH_SCENE` names another scene than the church.
+//! `LINKLIGHT_BENCH_SCENE` names another scene than the church, `LINKLIGHT_BENCH_ATLAS` another atlas than 128 texels a side.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
@@ -12,7 +12,7 @@ use linklight::display::shadow_maps::ShadowMaps;
 use linklight::gpu::shaders::surface_maps::{CubeRays, CubeRaysParams};
 use linklight::gpu::shaders::types::{Hit, Ray, SurfaceMapQuery};
 use linklight::gpu::{Buffer, Context, Options, Recorder};
-use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps};
+use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps, TexelVisibility};
 use linklight::report::tonemap::ToneSettings;
 use linklight::scene::camera::View;
 use linklight::scene::environment::Environment;
@@ -21,7 +21,7 @@ use linklight::scene::pose::Pose;
 use linklight::scene::{LoadOptions, builtin, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
-use linklight::stages::surface_maps::{MapFilter, MapInput, MapOptions, Sequence, SurfaceMaps};
+use linklight::stages::surface_maps::{MapFilter, MapInput, MapOptions, PlacedMaps, SurfaceMaps};
 use linklight::stages::trace::{self, Tracer};
 use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
@@ -31,8 +31,8 @@ use std::time::Instant;
 const QUERIES: usize = 1 << 19;
 const SIZE: UVec2 = UVec2::new(160, 90);
 
-/// Shortest of five submissions, seconds.
-fn seconds(context: &Context, mut body: impl FnMut(&mut Recorder<'_>)) -> f64 {
+/// Shortest of `rounds` submissions, seconds; the first of all compiles.
+fn seconds(context: &Context, rounds: usize, mut body: impl FnMut(&mut Recorder<'_>)) -> f64 {
     let once = |_| {
         let mut recorder = context.recorder("bench").unwrap();
         let start = Instant::now();
@@ -40,7 +40,7 @@ fn seconds(context: &Context, mut body: impl FnMut(&mut Recorder<'_>)) -> f64 {
         recorder.submit().unwrap();
         start.elapsed().as_secs_f64()
     };
-    (0..5).map(once).fold(f64::MAX, f64::min)
+    (0..rounds).map(once).fold(f64::MAX, f64::min)
 }
 
 fn surface_maps(criterion: &mut Criterion) {
@@ -69,56 +69,63 @@ fn surface_maps(criterion: &mut Criterion) {
         watch: &Unwatched,
     };
 
-    let start = Instant::now();
-    let method = SurfaceShadowMaps::prepare(&context, &stage, Settings::default()).unwrap();
-    println!("{name}: {}; made in {:.1} s", method.report(), start.elapsed().as_secs_f64());
-    let maps = &method.maps.as_ref().expect("maps by default").maps;
+    let atlas = std::env::var("LINKLIGHT_BENCH_ATLAS").map_or(128, |side| side.parse().expect("texels a side"));
+    // The maps are made apart, to be timed alone.
+    let settings = Settings { atlas_resolution: atlas, visibility: TexelVisibility::Rays, ..Settings::default() };
+    let mut method = SurfaceShadowMaps::prepare(&context, &stage, settings).unwrap();
+    let maps = making(&context, &method, settings, &tracer, bounds);
+    let filters = [settings.map_filter, settings.sender_filter];
+    let leaf_order = &method.tree.topology.leaf_order;
+    method.maps = Some(PlacedMaps::new(&context, maps, &method.atlas, leaf_order, filters).unwrap());
+    println!("{name}: {}", method.report());
+    let maps = &method.maps.as_ref().expect("made just now").maps;
     let bytes = maps.size_bytes() as f64 / f64::from(method.texels.count.max(1));
     println!("  {bytes:.0} bytes a texel at 6 x {0} x {0}", maps.options.resolution);
 
-    making(&context, &method, maps, &tracer, bounds);
     queries(&context, criterion, &method, maps, &tracer);
     gathers(&context, &method, &stage, &bvh, &pose);
 }
 
-/// Rays of making the maps against the same first rays alone.
-fn making(context: &Context, method: &SurfaceShadowMaps, maps: &SurfaceMaps, tracer: &Tracer<'_>, bounds: [Vec3; 2]) {
-    let resolution = maps.options.resolution;
-    let pixels = 6 * resolution * resolution;
-    let places = ((1 << 19) / pixels).clamp(1, method.texels.count);
-    let normals: Vec<Vec3> = {
-        let mut by_place = vec![Vec3::ZERO; maps.places.len()];
-        method
-            .atlas
-            .texels
-            .iter()
-            .zip(&maps.places)
-            .for_each(|(texel, &place)| by_place[place as usize] = texel.normal);
-        by_place
-    };
-    let map_normals = context.upload("bench/normals", &normals).unwrap();
-    let rays: Buffer<Ray> = context.buffer("bench/rays", (places * pixels) as usize).unwrap();
-    let hits: Buffer<Hit> = context.buffer("bench/hits", rays.len()).unwrap();
-    let params = CubeRaysParams { first_place: 0, chunk_count: places, resolution };
-    let alone = seconds(context, |recorder| {
-        recorder.dispatch(
-            &CubeRays { map_origins: &maps.origins, map_normals: &map_normals, rays: &rays, params },
-            rays.len(),
-        );
-        trace::closest_hit(recorder, tracer, &rays, &hits, rays.len());
-    });
+/// Makes the maps; their rays against the first rays of every n-th map alone.
+fn making(
+    context: &Context,
+    method: &SurfaceShadowMaps,
+    settings: Settings,
+    tracer: &Tracer<'_>,
+    bounds: [Vec3; 2],
+) -> SurfaceMaps {
+    let resolution = settings.map_resolution;
     let input = MapInput { atlas: &method.atlas, tracer: *tracer, apart: None, bounds, content: &[], cache: None };
-    let options = MapOptions { resolution, sequence: Sequence::Spiral, bias: 1.0 };
+    let options = MapOptions { resolution, sequence: settings.sequence, bias: settings.map_bias };
     let start = Instant::now();
     let made = SurfaceMaps::new(context, input, options, &Unwatched).unwrap();
-    let rate = made.ray_count as f64 / start.elapsed().as_secs_f64();
+    let spent = start.elapsed().as_secs_f64();
+    let rate = made.ray_count as f64 / spent;
+
+    let pixels = 6 * resolution * resolution;
+    let places = ((1 << 19) / pixels).clamp(1, method.texels.count);
+    let every = (method.atlas.texels.len() / places as usize).max(1);
+    let chosen = method.atlas.texels.iter().step_by(every).take(places as usize);
+    let (origins, normals): (Vec<Vec3>, Vec<Vec3>) =
+        chosen.map(|texel| (texel.position + method.texels.ray_offset * texel.normal, texel.normal)).unzip();
+    let map_origins = context.upload("bench/origins", &origins).unwrap();
+    let map_normals = context.upload("bench/normals", &normals).unwrap();
+    let rays: Buffer<Ray> = context.buffer("bench/rays", origins.len() * pixels as usize).unwrap();
+    let hits: Buffer<Hit> = context.buffer("bench/hits", rays.len()).unwrap();
+    let params = CubeRaysParams { first_place: 0, chunk_count: origins.len() as u32, resolution };
+    let alone = seconds(context, 5, |recorder| {
+        let pass = CubeRays { map_origins: &map_origins, map_normals: &map_normals, rays: &rays, params };
+        recorder.dispatch(&pass, rays.len());
+        trace::closest_hit(recorder, tracer, &rays, &hits, rays.len());
+    });
     let bvh_rate = rays.len() as f64 / alone;
     println!(
-        "  making maps: {:.2} M rays/s, first rays alone {:.2} M rays/s: {:.0} %",
+        "  making maps: {spent:.1} s, {:.2} M rays/s, first rays alone {:.2} M rays/s: {:.0} %",
         rate / 1e6,
         bvh_rate / 1e6,
         100.0 * rate / bvh_rate
     );
+    made
 }
 
 /// Look-ups against shadow rays between random texels that face each other.
@@ -155,9 +162,9 @@ fn queries(
     let asked = context.upload("bench/queries", &asked).unwrap();
     let rays = context.upload("bench/rays", &rays).unwrap();
     let (seen, free) = (context.buffer("bench/seen", count).unwrap(), context.buffer("bench/free", count).unwrap());
-    let by_rays = seconds(context, |recorder| trace::any_hit(recorder, tracer, &rays, &free, count));
+    let by_rays = seconds(context, 5, |recorder| trace::any_hit(recorder, tracer, &rays, &free, count));
     for filter in [MapFilter::None, MapFilter::Drawn, MapFilter::Four] {
-        let by_maps = seconds(context, |recorder| maps.query(recorder, &asked, &seen, count, filter));
+        let by_maps = seconds(context, 5, |recorder| maps.query(recorder, &asked, &seen, count, filter));
         println!(
             "  {count} pairs, filter {filter:?}: {:.2} M look-ups/s, {:.2} M shadow rays/s: {:.1} x",
             count as f64 / by_maps / 1e6,
@@ -182,7 +189,7 @@ fn queries(
 /// Bounces over texels and the gather of a picture, by maps and by rays.
 fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh: &Bvh, pose: &Pose) {
     let solve = |bounces| {
-        seconds(context, |recorder| {
+        seconds(context, 2, |recorder| {
             method.solve(recorder, Lit { world: stage.world, tracer: stage.tracer, bvh }, bounces)
         })
     };
@@ -216,7 +223,7 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
             view: &view,
         };
         let sample = Sample { index: 0, samples: 1, is_unlit: false };
-        let time = seconds(context, |recorder| display.draw(recorder, from, sample, &film));
+        let time = seconds(context, 3, |recorder| display.draw(recorder, from, sample, &film));
         let report = display.report(context).unwrap();
         println!(
             "  {SIZE} pixels by {gather_visibility:?}: {time:.3} s, {:.1} k pixels/s, {:.2} M nodes gathered/s, cut {:.0}",

@@ -15,6 +15,12 @@ layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_T
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
 
+bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
+{
+    free = 1.0;
+    return SEES_THROUGH;
+}
+
 float visibility(vec3 origin, vec3 target, uint leaf)
 {
     if (SEES_THROUGH) return 1.0;

@@ -3,13 +3,15 @@
 // The final gather of one pixel: a cut through the sender tree is found, and each of its nodes gathered, in one walk.
 //                                                                                              [Ritschel2008 4.4]
 // The kernel that includes this says how it sees:
-//     float visibility(vec3 origin, vec3 target, uint leaf)      share of the way that is free, 0..1
+//     bool is_told(vec3 origin, vec3 target, uint leaf, out float free)  the share without a ray, where one can do without
+//     float visibility(vec3 origin, vec3 target, uint leaf)              share of the way that is free, 0..1
 // Bindings 0 to 6 and set 1 are the kernel's.
 #include "lib/environment_sampling.glsl"
 #include "lib/offset.glsl"
 #include "lib/random.glsl"
 #include "lib/sender_gather.glsl"
 
+bool is_told(vec3 origin, vec3 target, uint leaf, out float free);
 float visibility(vec3 origin, vec3 target, uint leaf);
 
 // Of a pixel, means over its samples.
@@ -54,6 +56,7 @@ layout(push_constant, scalar) uniform Params {
     float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
     uint jitter;
     uint environment_samples;
+    float map_reach;            // senders nearer than so many of their radii are asked by rays, not by maps
 } params;
 
 layout(constant_id = 2) const bool COMPACT = false;
@@ -87,6 +90,16 @@ Arrival environment_arrival(uvec4 random, float share)
     return Arrival(light, vec3(0.0), vec3(0.0), receiver.position + 1e6 * direction, NO_SENDER);
 }
 
+vec3 direct_sum, indirect_sum, lost_sum;     // W m^-2 sr^-1
+
+void take(Arrival arrival, float free)
+{
+    direct_sum += free * arrival.direct;
+    indirect_sum += free * arrival.indirect;
+    lost_sum += free * arrival.lost;
+    start_showing(shown_luminance + free * luminance(arrival.direct + arrival.indirect));
+}
+
 void gather(ivec2 pixel, uint index, uvec3 corners)
 {
     vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
@@ -105,10 +118,10 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
     float samples_so_far = params.weight * float(params.sample_index + 1);
     start_showing(luminance(direct[index] + indirect[index]) / samples_so_far);
 
-    vec3 direct_sum = vec3(0.0), indirect_sum = vec3(0.0), lost_sum = vec3(0.0);
+    direct_sum = indirect_sum = lost_sum = vec3(0.0);
     uint node = 0, visited = 0, cut = 0, environment_taken = 0;
     while (true) {
-        // Up to the next arrival that would bring light.
+        // Up to the next arrival that would bring light and needs a ray: threads in lockstep cast theirs together.
         Arrival arrival;
         bool found = false;
         while (!found && node < params.node_count) {
@@ -117,17 +130,18 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
             ++cut;
             arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)));
             found = arrival.direct + arrival.indirect + arrival.lost != vec3(0.0);
+            float free;
+            if (found && is_told(origin, arrival.target, arrival.leaf, free)) {
+                take(arrival, free);
+                found = false;
+            }
         }
         while (!found && environment_taken < params.environment_samples) {
             arrival = environment_arrival(pcg4d(uvec4(index, environment_taken++, 1u, params.seed)), 1.0 / float(params.environment_samples));
             found = arrival.direct != vec3(0.0);
         }
         if (!found) break;
-        float free = visibility(origin, arrival.target, arrival.leaf);
-        direct_sum += free * arrival.direct;
-        indirect_sum += free * arrival.indirect;
-        lost_sum += free * arrival.lost;
-        start_showing(shown_luminance + free * luminance(arrival.direct + arrival.indirect));
+        take(arrival, visibility(origin, arrival.target, arrival.leaf));
     }
     direct[index] += params.weight * direct_sum;
     indirect[index] += params.weight * indirect_sum;

@@ -6,15 +6,15 @@
 #include "lib/rigid_objects.glsl"
 #include "trace/holes.glsl"
 
-// One thread per pixel: gathers from the sender tree, seeing by the maps of objects that move; by our own traversal where
-// their hulls overlap, and to the environment.                                              [Ritschel2008 3.3, 4.4]
+// One thread per pixel: gathers from the sender tree, seeing by the maps of objects that move; by our own traversal what
+// stands close by, where their hulls overlap, and the environment.                                              [Ritschel2008 3.3, 4.4]
 // reads the G-buffer, the sender tree, the maps, the objects, the hierarchy and what tells its holes, the environment
 // updates direct, indirect, gather_counts [pixel_count]   shared none
 layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;     // NODE_TEXELS each
 layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_TEXELS each, in leaf order
 layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
-layout(set = 0, binding = 25, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
-layout(set = 0, binding = 26, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 25) uniform usamplerBuffer run_offsets;
+layout(set = 0, binding = 26) uniform usamplerBuffer runs;
 layout(set = 0, binding = 27, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place, at rest
 layout(set = 0, binding = 28, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 layout(set = 0, binding = 30, scalar) readonly buffer RigidWords { uint rigid_words[]; };
@@ -22,30 +22,38 @@ layout(set = 0, binding = 31, scalar) readonly buffer RigidObjects { RigidObject
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
-uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
-uint surface_run(uint index) { return runs[index]; }
+uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
+uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 uint rigid_word(uint i) { return rigid_words[i]; }
 RigidObject rigid_object(uint i) { return rigid_objects[i]; }
 
 #include "display/final_gather.glsl"
 
-float visibility(vec3 origin, vec3 target, uint leaf)
+bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
 {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     uint triangle = texelFetch(visible_triangles, pixel, 0).x - 1;
-    uint object = rigid_word(rigid_word(RIGID_TRIANGLE_OBJECTS) + triangle), texel = NO_SENDER, sender_object = object;
-    if (leaf != NO_SENDER) {
-        sender_object = rigid_word(rigid_word(RIGID_LEAF_OBJECTS) + leaf);
-        vec2 b = vec2(texelFetch(g_position, pixel, 0).w, texelFetch(g_specular, pixel, 0).w);
-        uvec3 v = triangles[triangle];
-        bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), receiver.geometric) < 0.0;
-        texel = rigid_texel(triangle, vec3(1.0 - b.x - b.y, b), is_back);
-    }
-    if (texel == NO_SENDER || rigid_asks_rays(object, sender_object))
-        return is_hit(traverse(Ray(origin, 0.0, target - origin, 1.0), true)) ? 0.0 : 1.0;
+    uint object = rigid_word(rigid_word(RIGID_TRIANGLE_OBJECTS) + triangle);
+    uint sender_object = rigid_word(rigid_word(RIGID_LEAF_OBJECTS) + leaf);
+    vec2 b = vec2(texelFetch(g_position, pixel, 0).w, texelFetch(g_specular, pixel, 0).w);
+    uvec3 v = triangles[triangle];
+    bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), receiver.geometric) < 0.0;
+    uint texel = rigid_texel(triangle, vec3(1.0 - b.x - b.y, b), is_back);
+    SenderLeaf shape = sender_shape(leaf);
+    vec3 d = target - origin;
+    float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
+    free = 0.0;
+    if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || dot(d, d) < params.map_reach * params.map_reach * radius_squared)
+        return false;
     uint place = leaf_places[leaf], own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
-    RigidPoint sender = RigidPoint(target, leaf_normal(sender_shape(leaf)), sender_object, place, map_origins[place]);
-    return rigid_visibility(map_frame[0], sender, RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]));
+    RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, place, map_origins[place]);
+    free = rigid_visibility(map_frame[0], sender, RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]));
+    return true;
+}
+
+float visibility(vec3 origin, vec3 target, uint leaf)
+{
+    return is_hit(traverse(Ray(origin, 0.0, target - origin, 1.0), true)) ? 0.0 : 1.0;
 }
 
 void main() { gather_pixel(); }

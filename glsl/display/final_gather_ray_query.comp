@@ -14,4 +14,10 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT acceleration_struc
 #include "trace/free_way_ray_query.glsl"
 #include "display/final_gather.glsl"
 
+bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
+{
+    free = 0.0;
+    return false;
+}
+
 void main() { gather_pixel(); }

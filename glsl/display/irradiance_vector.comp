@@ -2,12 +2,12 @@
 #include "lib/prelude.glsl"
 #include "lib/brdf.glsl"
 #include "lib/cluster_basis.glsl"
-#include "lib/face_element.glsl"
+#include "lib/leaf_light.glsl"
 
 // One thread per pixel: all light but the punctual one, by the vector irradiance of the leaf element seen there. Each
 // channel shines along its own vector.                                                 [Gobbetti2003 3.5, Eq. 10]
 // reads the G-buffer, triangles, positions, normals, leaves, triangle_leaves, direct_irradiance and
-//       indirect_irradiance (per leaf and function), colors (per leaf)
+//       indirect_irradiance (per leaf and function), neighbours (rows of leaves), colors (per leaf)
 // updates direct, indirect [pixel_count]   shared none
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
@@ -26,16 +26,33 @@ layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { HalfV
 layout(set = 0, binding = 13, scalar) readonly buffer Colors { vec3 colors[]; };
 layout(set = 0, binding = 14, scalar) buffer Direct { vec3 direct[]; };
 layout(set = 0, binding = 15, scalar) buffer Indirect { vec3 indirect[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer NeighbourOffsets { uint neighbour_offsets[]; };  // per leaf, and one more
+layout(set = 0, binding = 17, scalar) readonly buffer Neighbours { uint neighbours[]; };
 layout(constant_id = 0) const uint IRRADIANCE_FUNCTIONS = 3u;
 // eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
 layout(push_constant, scalar) uniform Params {
     vec4 eye;
     float weight;
     float unit;             // of irradiance, W/m2
+    float reach;            // of a leaf's light over its border, in its shorter half sides
     float least_alpha;      // lobes are at least so wide: one direction stands for all light
     uint per_vertex;        // shade at the triangle's corners and interpolate
     uint shows_colors;      // unlit
 } params;
+
+LeafElement leaf_element(uint leaf) { return leaves[leaf]; }
+uvec2 leaf_row(uint leaf) { return params.reach > 0.0 ? uvec2(neighbour_offsets[leaf], neighbour_offsets[leaf + 1]) : uvec2(0); }
+uint leaf_neighbour(uint index) { return neighbours[index]; }
+
+void leaf_vectors(uint leaf, vec2 uv, out mat3 direct, out mat3 indirect)
+{
+    direct = indirect = mat3(0.0);
+    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
+        float b = basis(k, uv);
+        direct += b * unpacked(direct_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
+        indirect += b * unpacked(indirect_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
+    }
+}
 
 // Radiance towards the eye of light along the columns of `vectors`.
 vec3 radiance(Surface s, vec3 to_eye, mat3 vectors)
@@ -50,13 +67,8 @@ vec3 radiance(Surface s, vec3 to_eye, mat3 vectors)
 
 void shade(Surface s, uint leaf, vec3 point, out vec3 direct_radiance, out vec3 indirect_radiance)
 {
-    vec2 uv = clamp(plane_coordinates(leaves[leaf], point), 0.0, 1.0);
-    mat3 d = mat3(0.0), i = mat3(0.0);
-    for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
-        float b = basis(k, uv);
-        d += b * unpacked(direct_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
-        i += b * unpacked(indirect_irradiance[leaf * IRRADIANCE_FUNCTIONS + k], params.unit);
-    }
+    mat3 d, i;
+    light_on_leaf(leaf, point, params.reach, d, i);
     vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - point);
     direct_radiance = radiance(s, to_eye, d);
     indirect_radiance = radiance(s, to_eye, i);

@@ -72,6 +72,21 @@ bool intersect_triangle(RayFrame frame, uint slot, bool wanted, float t_min, ino
     return found;
 }
 
+// How far behind a hit the next one counts as another surface.
+float next_surface(float t, float gap) { return t * 1.000002 + gap; }
+
+// Of the two nearest hits so far and one that is nearer than the second, which `hit` is now and `before` was.
+void keep_both(Hit before, float gap, inout Hit first, inout Hit hit)
+{
+    Hit found = hit;
+    if (found.t < first.t) {
+        hit = is_hit(first) && first.t >= next_surface(found.t, gap) ? first : before;
+        first = found;
+    } else if (found.t < next_surface(first.t, gap)) {
+        hit = before;
+    }
+}
+
 void sort(inout uint a, inout uint b)
 {
     uint least = min(a, b);
@@ -91,9 +106,11 @@ const uint BVH_LEVELS = 48;
 // 64-bit words 1.1 (a load there is a test and a branch
 // per thread, a texel fetch is not); a node or a leaf by turns 0.75 in such buffers; bounds in f32 0.35 to 0.45, eight
 // children less; leaves of one triangle 1.7; new rays for threads that are done, every 8 to 24 turns, 1.85.
-Hit traverse(Ray ray, bool any)
+// Where `both` is true, the result is the nearest hit at least `gap` behind `first`, the nearest of all.
+Hit walk(Ray ray, bool any, bool both, float gap, inout Hit first)
 {
     Hit hit = Hit(ray.t_max, NO_HIT, vec2(0));
+    first = hit;
     if (!is_active(ray)) return hit;
     RayFrame frame = ray_frame(ray);
 
@@ -176,9 +193,21 @@ Hit traverse(Ray ray, bool any)
             leaf = next;
             next = 0;
         }
-        if (intersect_triangle(frame, slot, test, ray.t_min, hit) && any) break;
+        Hit before = hit;
+        bool found = intersect_triangle(frame, slot, test, ray.t_min, hit);
+        if (found && any) break;
+        if (both && found) keep_both(before, gap, first, hit);
         if (leaf == 0 && node == NO_NODE && group == 0 && depth == 0) break;
     }
     return hit;
 }
+
+Hit traverse(Ray ray, bool any)
+{
+    Hit first;
+    return walk(ray, any, false, 0.0, first);
+}
+
+// The nearest hit, and the nearest of those at least `gap` (and a rounding error) behind it.
+void traverse_both(Ray ray, float gap, out Hit first, out Hit second) { second = walk(ray, false, true, gap, first); }
 #endif

@@ -100,13 +100,13 @@ struct LeafElement {
     vec3 center;            // metres, world
     vec3 axis_x;            // unit
     vec3 axis_y;
-    vec2 half_extent;       // metres along them
+    vec3 half_extent;       // metres along them, and across
 };
 
 vec2 plane_coordinates(LeafElement e, vec3 point)
 {
     vec3 d = point - e.center;
-    return 0.5 + 0.5 * vec2(dot(d, e.axis_x), dot(d, e.axis_y)) / max(e.half_extent, vec2(1e-30));
+    return 0.5 + 0.5 * vec2(dot(d, e.axis_x), dot(d, e.axis_y)) / max(e.half_extent.xy, vec2(1e-30));
 }
 
 // Irradiance vectors of the three channels in half floats of a unit that fits them.

@@ -2,14 +2,14 @@
 #define LIB_SURFACE_MAP
 // Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
 //
-// Bridges: the kernel binds the runs of all pixels.
-//     uint surface_run_offset(uint index)        where the runs of a pixel's block start; the next one's ends them
-//     uint surface_run(uint index)               words: depths, two each, then where runs start in their blocks
+// Bridges: the kernel binds the runs of all pixels, as texels of four words.
+//     uvec4 surface_offset_texel(uint i)     where the runs of each pixel's blocks start; the next one's ends them
+//     uvec4 surface_run_texel(uint i)        depths, two a word; from firsts_at where runs start in their blocks
 #include "lib/cube_map.glsl"
 #include "lib/random.glsl"
 
-uint surface_run_offset(uint index);
-uint surface_run(uint index);
+uvec4 surface_offset_texel(uint i);
+uvec4 surface_run_texel(uint i);
 
 struct SurfaceMapFrame {
     uint resolution;        // pixels a side of a face
@@ -18,24 +18,37 @@ struct SurfaceMapFrame {
     uint sender_filter;     // of the sender's texel and those beside it: 0, 1, 2 likewise
     uint block_bits;        // places of a block are 2 to this, 8 or 16
     uint block_count;
-    uint firsts_at;         // words before those that tell where runs start
+    uint firsts_at;         // texels before those that tell where runs start
 };
 
-// The depth at a place of the sequence: of the last run of its block that starts at it or before.
+uint word_of(uvec4 texel, uint k) { return k < 2 ? (k == 0 ? texel.x : texel.y) : (k == 2 ? texel.z : texel.w); }
+
+// The depth at a place of the sequence: of the last run of its block that starts at it or before. Sought first among
+// texels of 16 (or 8) runs, then within one: a fetch costs more than the four steps that it saves.
 uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
 {
-    uint bits = frame.block_bits, mask = (1u << bits) - 1, shift = bits == 8 ? 2 : 1;
+    uint bits = frame.block_bits, mask = (1u << bits) - 1, shift = bits == 8 ? 4 : 3;
     uint block = pixel * frame.block_count + (place >> bits), within = place & mask;
-    uint low = surface_run_offset(block), high = surface_run_offset(block + 1);
-    // low's run starts at or before the place, high's after it.
-    while (high - low > 1) {
-        uint middle = low + high >> 1;
-        uint word = surface_run(frame.firsts_at + (middle >> shift));
-        uint first = word >> bits * (middle & (1u << shift) - 1) & mask;
-        if (first <= within) low = middle;
-        else high = middle;
+    uint low = word_of(surface_offset_texel(block >> 2), block & 3);
+    uint high = word_of(surface_offset_texel(block + 1 >> 2), block + 1 & 3);
+    uint texel = low >> shift, last = high - 1 >> shift;
+    while (texel < last) {
+        uint middle = texel + last + 1 >> 1;
+        if ((surface_run_texel(frame.firsts_at + middle).x & mask) <= within) texel = middle;
+        else last = middle - 1;
     }
-    return surface_run(low >> 1) >> 16 * (low & 1) & 0xffffu;
+    uvec4 firsts = surface_run_texel(frame.firsts_at + texel);
+    low = max(low, texel << shift);
+    high = min(high, texel + 1 << shift);
+    // low's run starts at or before the place, high's after it.
+    for (uint k = 0; k < 4; ++k) {
+        uint middle = low + high >> 1, in_texel = middle & (1u << shift) - 1, per_word = shift - 2;
+        uint word = word_of(firsts, in_texel >> per_word);
+        bool starts = (word >> bits * (in_texel & (1u << per_word) - 1) & mask) <= within;
+        low = starts ? middle : low;
+        high = starts ? high : middle;
+    }
+    return word_of(surface_run_texel(low >> 3), low >> 1 & 3) >> 16 * (low & 1) & 0xffffu;
 }
 
 // Widths of a pixel by which the point's plane may lie off the point's own distance.

@@ -10,15 +10,15 @@ layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Pairs { uvec2 pairs[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Texels { AtlasTexel texels[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 3) uniform usamplerBuffer run_offsets;
+layout(set = 0, binding = 4) uniform usamplerBuffer runs;
 layout(set = 0, binding = 5, scalar) readonly buffer RigidWords { uint rigid_words[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer RigidObjects { RigidObject rigid_objects[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Visibility { float visibility[]; };
 layout(push_constant, scalar) uniform Params { uint pair_count; SurfaceMapFrame frame; } params;
 
-uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
-uint surface_run(uint index) { return runs[index]; }
+uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
+uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 uint rigid_word(uint i) { return rigid_words[i]; }
 RigidObject rigid_object(uint i) { return rigid_objects[i]; }
 

@@ -12,13 +12,13 @@ struct SurfaceMapQuery {
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Queries { SurfaceMapQuery queries[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 2) uniform usamplerBuffer run_offsets;
+layout(set = 0, binding = 3) uniform usamplerBuffer runs;
 layout(set = 0, binding = 4, scalar) writeonly buffer Visibility { float visibility[]; };
 layout(push_constant, scalar) uniform Params { uint query_count; SurfaceMapFrame frame; } params;
 
-uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
-uint surface_run(uint index) { return runs[index]; }
+uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
+uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 
 void main()
 {

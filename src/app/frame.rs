@@ -2,14 +2,14 @@
 
 use super::AppError;
 use super::cli::{Channel, Display};
+use super::on_clusters::ClustersShown;
 use super::on_elements::OnElements;
 use super::on_texels::TexelsShown;
-use super::render::{RenderRequest, cache_folder};
+use super::render::RenderRequest;
 use super::stage::Stage;
 use crate::display::direct::{Canvas, Sample};
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
-use crate::display::irradiance_vector;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::splat::{self, SplatLight, SplatSums};
 use crate::display::tone_map::LightParts;
@@ -17,7 +17,7 @@ use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
 use crate::methods::explicit_visibility::{self, ExplicitVisibility};
-use crate::methods::face_cluster::{self, FaceClusterError, FaceClusters};
+use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
@@ -27,7 +27,6 @@ use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
 use glam::UVec2;
 use serde_json::Value;
-use std::path::Path;
 
 /// Tasks that sample a picture again and again, and may be left at any sample for a newer one.
 pub const SAMPLING_TASKS: [&str; 2] = ["path-tracing", GATHER_TASK];
@@ -38,7 +37,7 @@ pub enum Method {
     PathTracing(Box<PathTracing>),
     OnElements(Box<VertexShown>),
     OnTexels(Box<TexelsShown>),
-    FaceClusters(Box<FaceClustersShown>),
+    OnClusters(Box<ClustersShown>),
 }
 
 /// A method's solution for one frame, before any display.
@@ -48,13 +47,6 @@ pub enum Solved<'a> {
     Clusters(&'a FaceClusters, Box<face_cluster::Solution>),
     /// On no surface: pixels.
     Pixels,
-}
-
-/// Face-cluster radiosity with the display stage that shows it.
-pub struct FaceClustersShown {
-    pub(super) method: FaceClusters,
-    pub(super) shadow_maps: ShadowMaps,
-    pub(super) g_buffer: GBuffer,
 }
 
 /// A method with the display stages that show it.
@@ -82,26 +74,6 @@ pub(super) fn explicit_stage<'a>(stage: &'a Stage, watch: &'a dyn Watch) -> expl
         environment: &stage.environment,
         world: &stage.world,
         tracer: stage.tracer(),
-        watch,
-    }
-}
-
-/// As [`explicit_stage`], for face clusters.
-pub(super) fn cluster_stage<'a>(
-    stage: &'a Stage,
-    cluster_cache: Option<&'a Path>,
-    watch: &'a dyn Watch,
-) -> face_cluster::Stage<'a> {
-    face_cluster::Stage {
-        scene: &stage.scene,
-        geometry: &stage.geometry,
-        rest_positions: &stage.rest_positions,
-        pose: &stage.pose,
-        bounds: stage.bounds,
-        environment: &stage.environment,
-        world: &stage.world,
-        bvh: &stage.bvh,
-        cluster_cache,
         watch,
     }
 }
@@ -150,13 +122,7 @@ impl Method {
                 Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
             }
             "face-cluster" => {
-                let cache = cache_folder().map(|folder| folder.join("clusters"));
-                let stage_of = cluster_stage(stage, cache.as_deref(), watch);
-                let method = FaceClusters::prepare(context, &stage_of, request.settings()?);
-                let method = method.map_err(AppError::failed)?;
-                let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
-                let g_buffer = GBuffer::new(context, request.width, request.height)?;
-                Ok(Self::FaceClusters(Box::new(FaceClustersShown { method, shadow_maps, g_buffer })))
+                Ok(Self::OnClusters(Box::new(ClustersShown::prepare(context, request, stage, watch)?)))
             }
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
@@ -189,11 +155,9 @@ impl Method {
                 Ok(Solved::Elements(&*shown.method))
             }
             Self::OnTexels(shown) => Ok(Solved::Texels(shown.solve(context, stage, request.bounces)?)),
-            Self::FaceClusters(shown) => {
-                let solved = shown.method.solve(context, &cluster_stage(stage, None, watch), request.bounces);
-                solved.map_err(AppError::failed)?;
-                let solution = shown.method.keep(context).map_err(AppError::failed)?;
-                Ok(Solved::Clusters(&shown.method, Box::new(solution)))
+            Self::OnClusters(shown) => {
+                let (method, solution) = shown.solve(context, stage, request.bounces, watch)?;
+                Ok(Solved::Clusters(method, Box::new(solution)))
             }
             Self::PathTracing(_) => Ok(Solved::Pixels),
         }
@@ -205,7 +169,7 @@ impl Method {
             Self::PathTracing(_) => Value::Null,
             Self::OnElements(shown) => shown.method.facts()?,
             Self::OnTexels(shown) => serde_json::to_value(shown.report())?,
-            Self::FaceClusters(shown) => serde_json::to_value(shown.method.report())?,
+            Self::OnClusters(shown) => serde_json::to_value(shown.report())?,
         })
     }
 
@@ -214,7 +178,7 @@ impl Method {
         match self {
             Self::PathTracing(_) => Ok(true),
             Self::OnElements(shown) => shown.method.relight(context, &stage.world).map(|()| true),
-            Self::OnTexels(_) | Self::FaceClusters(_) => Ok(false),
+            Self::OnTexels(_) | Self::OnClusters(_) => Ok(false),
         }
     }
 
@@ -236,7 +200,7 @@ impl Method {
                 Ok(true)
             }
             Self::OnTexels(shown) => shown.follow(context, request, stage, watch),
-            Self::FaceClusters(_) => Ok(false),
+            Self::OnClusters(_) => Ok(false),
         }
     }
 
@@ -260,7 +224,7 @@ impl Method {
                 shown.splat_sums = splat_sums(context, request)?;
             }
             Self::OnTexels(shown) => shown.show(context, request)?,
-            Self::FaceClusters(shown) => shown.g_buffer = g_buffer()?,
+            Self::OnClusters(shown) => shown.show(context, request, stage)?,
         }
         Ok(())
     }
@@ -334,34 +298,7 @@ impl Method {
                 Ok(())
             }
             Self::OnTexels(shown) => shown.frame(context, request, stage, film, watch),
-            Self::FaceClusters(shown) => {
-                let FaceClustersShown { method, shadow_maps, g_buffer } = &mut **shown;
-                let solved = method.solve(context, &cluster_stage(stage, None, watch), request.bounces);
-                let partial = match solved {
-                    Err(FaceClusterError::Interrupted(interrupted)) => {
-                        // Whole passes of light can be shown; what was under way is dropped.
-                        let last = method.report().iterations.last().ok_or(interrupted)?;
-                        let after = format!("{} of {} bounces", last.name, request.bounces);
-                        method.locate(context, &cluster_stage(stage, None, watch)).map_err(AppError::failed)?;
-                        Some(AppError::Partial(after))
-                    }
-                    other => {
-                        other.map_err(AppError::failed)?;
-                        None
-                    }
-                };
-                let solution = method.keep(context).map_err(AppError::failed)?;
-                tracing::info!("{}", method.report());
-                let mut recorder = context.recorder("frame")?;
-                recorder.scope("display", |recorder| {
-                    let light = method.light(&solution);
-                    shadow_maps.draw(recorder, world, pose, *bounds);
-                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
-                    irradiance_vector::draw(recorder, light, canvas);
-                });
-                recorder.submit()?;
-                partial.map_or(Ok(()), Err)
-            }
+            Self::OnClusters(shown) => shown.frame(context, request, stage, film, watch),
         }
     }
 }

@@ -36,6 +36,7 @@ pub mod lag;
 pub mod leak;
 pub mod measure;
 pub mod methods;
+mod on_clusters;
 mod on_elements;
 mod on_texels;
 pub mod output;

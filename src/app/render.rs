@@ -92,7 +92,7 @@ pub fn displays(method: &Method) -> &'static [Display] {
     match method.key {
         "path-tracing" => &[],
         "surface-shadow-maps" => &[Display::FinalGather, Display::Lightmap],
-        "face-cluster" => &[Display::IrradianceVector],
+        "face-cluster" => &[Display::IrradianceVector, Display::FinalGather],
         "antiradiance" => &[Display::Vertex, Display::Splat, Display::FinalGather],
         _ => &[Display::Vertex, Display::FinalGather],
     }
@@ -197,7 +197,7 @@ impl RenderRequest {
             let (what, others) = if displays.contains(&Display::Lightmap) {
                 ("texels, not vertices", "final-gather or lightmap")
             } else if displays.contains(&Display::IrradianceVector) {
-                ("clusters of faces, not vertices", "irradiance-vector")
+                ("clusters of faces, not vertices", "irradiance-vector or final-gather")
             } else if displays.contains(&Display::Splat) {
                 ("vertices and patches, not an atlas", "vertex, splat or final-gather")
             } else {

@@ -58,6 +58,8 @@ crate::settings! {
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
+        /// Senders nearer than so many of their radii are asked by rays where maps are the visibility.
+        gather_map_reach: f32 = 4.0, range 0.0..=1000.0, unit "radii", paper "0: maps alone";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
@@ -216,6 +218,7 @@ impl FinalGather {
                         clamp_radii: settings.gather_clamp,
                         jitter: u32::from(settings.gather_jitter),
                         environment_samples: if environment.info.is_black != 0 { 0 } else { settings.environment_samples },
+                        map_reach: settings.gather_map_reach,
                     },
                     constants: $constants,
                 };

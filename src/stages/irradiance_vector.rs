@@ -21,6 +21,11 @@ pub struct ElementLight<'a> {
     pub unit: f32,
     /// Functions a leaf.
     pub functions: u32,
+    /// Per leaf, and one more: where the row of leaves beside it starts.
+    pub neighbour_offsets: &'a Buffer<u32>,
+    pub neighbours: &'a Buffer<u32>,
+    /// How far the light of a leaf reaches over its border, in its shorter half sides; 0: leaves meet in steps.
+    pub reach: f32,
     /// False colours per leaf.
     pub colors: &'a Buffer<Vec3>,
     /// They are shown instead of all light, unlit.
@@ -53,7 +58,9 @@ impl ElementLight<'_> {
             indirect_vectors: self.indirect,
             direct_irradiance,
             indirect_irradiance,
-            params: passes::ElementsParams { element_count: elements.count, unit: self.unit },
+            neighbour_offsets: self.neighbour_offsets,
+            neighbours: self.neighbours,
+            params: passes::ElementsParams { element_count: elements.count, unit: self.unit, reach: self.reach },
             constants: passes::ElementsConstants { irradiance_functions: self.functions },
         };
         recorder.dispatch(&pass, elements.count);

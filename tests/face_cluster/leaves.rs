@@ -2,8 +2,8 @@
 
 use crate::common::Random;
 use crate::grown::{FUNCTIONS, as_words, check, flat, grown, random_vectors, vectors};
-use crate::twins::{self, NONE, Vectors};
-use glam::{DVec2, DVec3, Mat3, UVec2};
+use crate::twins::NONE;
+use glam::{DVec3, UVec2};
 use linklight::gpu::Buffer;
 use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::{FaceElement, LeafElement};
@@ -76,7 +76,7 @@ fn leaves_are_numbered_found_and_kept() {
     for (leaf, &e) in g.read(&kept).iter().zip(&leaves) {
         let element = &g.elements[e];
         assert_eq!((leaf.center, leaf.axis_x, leaf.axis_y), (element.center, element.axis_x, element.axis_y));
-        assert_eq!(leaf.half_extent, element.half_extent.truncate());
+        assert_eq!(leaf.half_extent, element.half_extent);
     }
     for (halves, light) in halves.iter().zip(&light) {
         let found: Vec<f32> = g.read(halves).iter().flat_map(|h| crate::fixture::of_halves(h, unit)).collect();
@@ -85,80 +85,62 @@ fn leaves_are_numbered_found_and_kept() {
     }
 }
 
-/// Corners of leaves against all leaves that meet there, found without the tree; and the bilinear light between them.
+/// Rows of neighbours against all pairs of leaves, found without the tree.
 #[test]
-fn corners_are_smoothed() {
+fn leaves_know_whose_light_reaches_them() {
     let g = grown(80);
     let (count, leaves) = (g.elements.len(), g.leaves());
-    let mut random = Random(15);
-    let light = [0, 1].map(|_| random_vectors(&mut random, count * FUNCTIONS));
-    let tables = [0, 1].map(|k| g.table(&as_words(&light[k])));
     let numbers: Vec<u32> = (0..count).map(|e| leaves.iter().filter(|&&leaf| leaf < e).count() as u32).collect();
-    let halves = [0, 1].map(|_| g.context.buffer("test/halves", leaves.len() * 4).unwrap());
-    let unit = 1.0 / 512.0;
-    let mut recorder = g.context.recorder("test").unwrap();
-    let pass = passes::SmoothLeaves {
-        elements: &g.table(&g.elements),
-        leaf_indices: &g.table(&numbers),
-        direct_irradiance: &tables[0],
-        indirect_irradiance: &tables[1],
-        leaf_direct: &halves[0],
-        leaf_indirect: &halves[1],
-        params: passes::SmoothLeavesParams { element_count: count as u32, inverse_unit: 1.0 / unit },
-        constants: passes::SmoothLeavesConstants { irradiance_functions: FUNCTIONS as u32 },
+    let (elements, numbered) = (g.table(&g.elements), g.table(&numbers));
+    let reach = 0.5;
+    let run = |offsets: &Buffer<u32>, neighbours: &Buffer<u32>, writes: u32| {
+        let mut recorder = g.context.recorder("test").unwrap();
+        let pass = passes::FindNeighbours {
+            elements: &elements,
+            leaf_indices: &numbered,
+            neighbour_offsets: offsets,
+            neighbours,
+            params: passes::FindNeighboursParams { element_count: count as u32, reach, writes },
+        };
+        recorder.dispatch(&pass, count);
+        recorder.submit().unwrap();
     };
-    recorder.dispatch(&pass, count);
-    recorder.submit().unwrap();
+    let counts = g.table(&vec![7u32; leaves.len()]);
+    run(&counts, &g.table(&[0u32]), 0);
+    let counts = g.read(&counts);
+    let mut offsets = vec![0u32];
+    counts.iter().for_each(|n| offsets.push(offsets[offsets.len() - 1] + n));
+    let rows = g.table(&vec![u32::MAX; offsets[leaves.len()] as usize]);
+    run(&g.table(&offsets), &rows, 1);
+    let rows = g.read(&rows);
 
-    let of = |e: usize, point: DVec3, light: &[Mat3]| -> Vectors {
-        let uv = twins::plane_coordinates(&g.elements[e], point).clamp(DVec2::ZERO, DVec2::ONE);
-        let mut sum = [DVec3::ZERO; 3];
-        for k in 0..FUNCTIONS {
-            let v = vectors(&light[e * FUNCTIONS + k]);
-            (0..3).for_each(|c| sum[c] += twins::basis(k, uv) * v[c]);
-        }
-        sum
+    // How far apart the boxes are along the axis that parts them most, beyond the margin; metres.
+    let gap = |a: &FaceElement, b: &FaceElement, is_leaf: bool| -> f64 {
+        let h = b.half_extent;
+        let margin = f64::from(reach * if is_leaf { h.x.min(h.y) } else { h.x.max(h.y) });
+        let d = b.center.as_dvec3() - a.center.as_dvec3();
+        let span = |e: &FaceElement, axis: DVec3| -> f64 {
+            let along = [e.axis_x, e.axis_y, e.axis_z].map(|own| own.as_dvec3().dot(axis).abs());
+            DVec3::from_array(along).dot(e.half_extent.as_dvec3())
+        };
+        let axes = [a.axis_x, a.axis_y, a.axis_z, b.axis_x, b.axis_y, b.axis_z].map(|axis| axis.as_dvec3());
+        axes.map(|axis| d.dot(axis).abs() - span(a, axis) - span(b, axis) - margin).into_iter().fold(f64::MIN, f64::max)
     };
-    let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE];
-    let mut met = 0;
-    for (found, light) in halves.iter().zip(&light) {
-        let found: Vec<f32> = g.read(found).iter().flat_map(|h| crate::fixture::of_halves(h, unit)).collect();
-        let mut expected = Vec::new();
-        for &leaf in &leaves {
-            let own = &g.elements[leaf];
-            let near = 0.1 * f64::from(own.half_extent.x.min(own.half_extent.y));
-            let values = corners.map(|uv| {
-                let point = twins::plane_point(own, uv);
-                let holds = |e: &FaceElement| {
-                    let d = point - e.center.as_dvec3();
-                    let along = [e.axis_x, e.axis_y, e.axis_z].map(|axis| d.dot(axis.as_dvec3()).abs());
-                    DVec3::from_array(along).cmple(e.half_extent.as_dvec3() + near).all()
-                };
-                // Found from the root down: all that hold it do.
-                let is_found = |e: &FaceElement| {
-                    let above = std::iter::successors(Some(e), |e| g.elements.get(e.parent as usize));
-                    above.into_iter().all(holds)
-                };
-                let meets = |&&other: &&usize| {
-                    let e = &g.elements[other];
-                    let is_one_surface = e.instance == own.instance && e.axis_z.dot(own.axis_z) > 0.8;
-                    other == leaf || (is_one_surface && is_found(e))
-                };
-                let meeting: Vec<Vectors> = leaves.iter().filter(meets).map(|&e| of(e, point, light)).collect();
-                met += meeting.len() - 1;
-                [0, 1, 2].map(|c| meeting.iter().map(|v| v[c]).sum::<DVec3>() / meeting.len() as f64)
-            });
-            // The function that is linear in u and in v between the corners, projected on each of four.
-            for k in 0..4 {
-                expected.push([0, 1, 2].map(|c| {
-                    twins::mean(|uv| {
-                        let w = [(1.0 - uv.x) * (1.0 - uv.y), uv.x * (1.0 - uv.y), (1.0 - uv.x) * uv.y, uv.x * uv.y];
-                        twins::basis(k, uv) * (0..4).map(|i| w[i] * values[i][c]).sum::<DVec3>()
-                    })
-                }));
+    let mut pairs = 0;
+    for (leaf, &own) in leaves.iter().enumerate() {
+        let row = &rows[offsets[leaf] as usize..offsets[leaf + 1] as usize];
+        for (other, &e) in leaves.iter().enumerate().filter(|&(_, &e)| e != own) {
+            let (a, b) = (&g.elements[own], &g.elements[e]);
+            let above = std::iter::successors(Some(b), |e| g.elements.get(e.parent as usize));
+            let apart = above.enumerate().map(|(k, e)| gap(a, e, k == 0)).fold(f64::MIN, f64::max);
+            let alike = f64::from(a.axis_z.dot(b.axis_z)) - 0.8;
+            if apart.abs() < 1e-5 || alike.abs() < 1e-5 {
+                continue;
             }
+            let expected = a.instance == b.instance && apart < 0.0 && alike > 0.0;
+            assert_eq!(row.contains(&(other as u32)), expected, "leaf {other} beside {leaf}, {apart} m apart");
+            pairs += usize::from(expected);
         }
-        check("smoothed", &found, &flat(&expected), 5e-4);
     }
-    assert!(met > leaves.len(), "{met} meetings at the corners of {} leaves", leaves.len());
+    assert!(pairs > leaves.len(), "{pairs} neighbours of {} leaves", leaves.len());
 }

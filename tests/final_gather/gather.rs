@@ -52,6 +52,7 @@ fn error(fixture: &Fixture, gather: &Gather, reflected: &[Vec3]) -> f64 {
 const ALL_SEEN: Settings = Settings {
     gather_threshold: 0.0,
     gather_visibility: Visibility::None,
+    gather_map_reach: 0.0,
     gather_jitter: false,
     gather_clamp: 0.0,
     environment_samples: 1,

@@ -5,5 +5,6 @@ mod bound;
 mod common;
 mod fixture;
 mod gather;
+mod pack;
 mod tree;
 mod twins;

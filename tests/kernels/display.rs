@@ -23,9 +23,9 @@ use linklight::stages::film::Film;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
 
-const SIZE: UVec2 = UVec2::new(61, 43);
+pub const SIZE: UVec2 = UVec2::new(61, 43);
 /// Radiance near 1 out of some fifty roundings; a narrow lobe multiplies errors of directions by 1 / alpha = 6.
-const RADIANCE: Tolerance = Tolerance { absolute: 5e-5, relative: 3e-4 };
+pub const RADIANCE: Tolerance = Tolerance { absolute: 5e-5, relative: 3e-4 };
 /// The map is read at a direction that drivers take through arc functions, see `environment_irradiance`.
 const BACKGROUND: Tolerance = Tolerance { absolute: 2e-3, relative: 0.0 };
 
@@ -40,18 +40,18 @@ struct Pictures {
     is_background: Vec<bool>,
 }
 
-struct Case {
-    scene: Scene,
-    geometry: Geometry,
-    pose: Pose,
-    environment: Environment,
-    view: View,
+pub struct Case {
+    pub scene: Scene,
+    pub geometry: Geometry,
+    pub pose: Pose,
+    pub environment: Environment,
+    pub view: View,
     direct_irradiance: Vec<Vec3>,
     indirect_irradiance: Vec<Vec3>,
 }
 
 /// A floor of shiny cells under a point light and a sun, beside an unlit and a glowing panel.
-fn case(lens: Lens) -> Case {
+pub fn case(lens: Lens) -> Case {
     let random = &mut Random(51);
     let shiny = Material {
         metallic: 0.3,
@@ -94,17 +94,17 @@ fn case(lens: Lens) -> Case {
 }
 
 /// The G-buffer of one sample as the device drew it.
-struct Surfaces {
-    triangle: Vec<u32>,
-    position: Vec<Vec4>,
-    normal: Vec<Vec4>,
-    albedo: Vec<Vec4>,
-    specular: Vec<Vec4>,
-    emission: Vec<Vec4>,
+pub struct Surfaces {
+    pub triangle: Vec<u32>,
+    pub position: Vec<Vec4>,
+    pub normal: Vec<Vec4>,
+    pub albedo: Vec<Vec4>,
+    pub specular: Vec<Vec4>,
+    pub emission: Vec<Vec4>,
 }
 
 impl Surfaces {
-    fn of(context: &Context, g_buffer: &GBuffer) -> Self {
+    pub fn of(context: &Context, g_buffer: &GBuffer) -> Self {
         let image = |image: &Image| -> Vec<Vec4> {
             context.download_image::<[f32; 4]>(image, 0).unwrap().into_iter().map(Vec4::from).collect()
         };
@@ -134,7 +134,7 @@ fn arriving(light: &PosedLight, point: Vec3) -> (Vec3, Vec3) {
 }
 
 /// Lambert under GGX, sr^-1.                                          [Walter2007; Heitz2014; glTF 2.0 B.3]
-fn brdf(albedo: Vec4, specular: Vec4, normal: Vec3, alpha: f32, to_eye: Vec3, to_light: Vec3) -> Vec3 {
+pub fn brdf(albedo: Vec4, specular: Vec4, normal: Vec3, alpha: f32, to_eye: Vec3, to_light: Vec3) -> Vec3 {
     let half = (to_eye + to_light).normalize();
     let (cos_eye, cos_light) = (normal.dot(to_eye).max(1e-6), normal.dot(to_light));
     let fresnel = specular.truncate().lerp(Vec3::splat(albedo.w), (1.0 - to_eye.dot(half)).powi(5));
@@ -146,7 +146,7 @@ fn brdf(albedo: Vec4, specular: Vec4, normal: Vec3, alpha: f32, to_eye: Vec3, to
 }
 
 /// Share of even light that the specular lobe sends to the eye.                                   [Karis2014]
-fn specular_albedo(albedo: Vec4, specular: Vec4, alpha: f32, cos_eye: f32) -> Vec3 {
+pub fn specular_albedo(albedo: Vec4, specular: Vec4, alpha: f32, cos_eye: f32) -> Vec3 {
     let r = alpha.sqrt() * Vec4::new(-1.0, -0.0275, -0.572, 0.022) + Vec4::new(1.0, 0.0425, 1.04, -0.04);
     let a004 = (r.x * r.x).min((-9.28 * cos_eye.clamp(0.0, 1.0)).exp2()) * r.x + r.y;
     let (scale, bias) = (-1.04 * a004 + r.z, 1.04 * a004 + r.w);

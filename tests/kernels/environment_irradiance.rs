@@ -36,7 +36,7 @@ fn element_shift(element: u32) -> Vec2 {
 }
 
 /// Square to hemisphere about +z, cosine-weighted.                                  [Shirley1997]
-fn cosine_hemisphere(square: Vec2) -> Vec3 {
+pub fn cosine_hemisphere(square: Vec2) -> Vec3 {
     let p = 2.0 * square - 1.0;
     let (radius, angle) = match p {
         Vec2::ZERO => return Vec3::Z,
@@ -54,7 +54,7 @@ fn element_ray(ray: u32, side: u32, shift: Vec2) -> Vec3 {
 }
 
 /// Orthonormal, the normal last.                                                    [Duff2017]
-fn basis_of(n: Vec3) -> Mat3 {
+pub fn basis_of(n: Vec3) -> Mat3 {
     let s = if n.z >= 0.0 { 1.0 } else { -1.0 };
     let a = -1.0 / (s + n.z);
     let b = n.x * n.y * a;

@@ -2,15 +2,16 @@
 
 use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
-use glam::{Mat3, UVec2, UVec3, Vec2, Vec3};
+use glam::{Mat3, UVec2, UVec3, Vec3};
 use linklight::gpu::Context;
 use linklight::gpu::shaders::irradiance_vector::{Elements, ElementsConstants, ElementsParams};
 use linklight::gpu::shaders::types::{HalfVectors, LeafElement};
 
 const BACK: u32 = 1 << 31;
 const NO_LEAF: u32 = u32::MAX;
-const FUNCTIONS: usize = 3;
-const UNIT: f32 = 0.25;
+pub const FUNCTIONS: usize = 3;
+pub const UNIT: f32 = 0.25;
+pub const REACH: f32 = 0.8;
 /// Some tens of products; vectors are halves exactly.
 const TOLERANCE: Tolerance = Tolerance { absolute: 1e-5, relative: 1e-5 };
 
@@ -25,10 +26,48 @@ fn half(value: f32) -> u32 {
     (bits >> 31 << 15) | (exponent as u32) << 10 | (bits >> 13 & 0x3ff)
 }
 
-fn packed(m: &Mat3) -> HalfVectors {
+pub fn packed(m: &Mat3) -> HalfVectors {
     let values = m.to_cols_array();
     let word = |k: usize| half(values[2 * k]) | values.get(2 * k + 1).map_or(0, |value| half(*value)) << 16;
     HalfVectors { words: [word(0), word(1), word(2), word(3), word(4)] }
+}
+
+/// Leaves, and those beside each: what light is on them, in units of [`UNIT`] and [`FUNCTIONS`] a leaf.
+pub struct Leaves {
+    pub shapes: Vec<LeafElement>,
+    pub rows: Vec<Vec<u32>>,
+}
+
+impl Leaves {
+    /// Of one leaf alone, and how much it counts.
+    fn of_leaf(&self, vectors: &[Mat3], leaf: usize, point: Vec3) -> (Mat3, f32) {
+        let shape = &self.shapes[leaf];
+        let axes = [shape.axis_x, shape.axis_y, shape.axis_x.cross(shape.axis_y)];
+        let offset = Vec3::from(axes.map(|axis| (point - shape.center).dot(axis)));
+        let s = (offset / shape.half_extent).clamp(Vec3::NEG_ONE, Vec3::ONE) * 3.0f32.sqrt();
+        let functions = &vectors[leaf * FUNCTIONS..][..FUNCTIONS];
+        let over = (offset.abs() - shape.half_extent).max_element();
+        let share = (1.0 - over / (REACH * shape.half_extent.truncate().min_element())).clamp(0.0, 1.0);
+        let area = 4.0 * shape.half_extent.x * shape.half_extent.y;
+        (UNIT * (functions[0] + s.x * functions[1] + s.y * functions[2]), share / area)
+    }
+
+    /// The mean of the leaf and those beside it.
+    pub fn light(&self, vectors: &[Mat3], leaf: usize, point: Vec3) -> Mat3 {
+        let (own, weight) = self.of_leaf(vectors, leaf, point);
+        let least = 1e-6 / self.shapes[leaf].half_extent.truncate().element_product();
+        let mut sum = (own * weight.max(least), weight.max(least));
+        for &other in &self.rows[leaf] {
+            let (light, weight) = self.of_leaf(vectors, other as usize, point);
+            sum = (sum.0 + light * weight, sum.1 + weight);
+        }
+        sum.0 * (1.0 / sum.1)
+    }
+
+    /// Where the rows start, and their number.
+    pub fn row_starts(&self) -> Vec<u32> {
+        (0..=self.rows.len()).map(|leaf| self.rows[..leaf].iter().map(Vec::len).sum::<usize>() as u32).collect()
+    }
 }
 
 /// Two triangles of a double-sided sheet, and one whose front alone has a leaf.
@@ -39,7 +78,7 @@ struct Case {
     triangles: Vec<UVec3>,
     offsets: Vec<u32>,
     incident: Vec<u32>,
-    leaves: Vec<LeafElement>,
+    leaves: Leaves,
     triangle_leaves: Vec<UVec2>,
     direct: Vec<Mat3>,
     indirect: Vec<Mat3>,
@@ -51,7 +90,7 @@ impl Case {
         let leaf = |random: &mut Random| {
             let axis_x = vector(random).normalize();
             let axis_y = axis_x.any_orthonormal_vector();
-            LeafElement { center: vector(random), axis_x, axis_y, half_extent: Vec2::new(1.5, 0.75) }
+            LeafElement { center: vector(random), axis_x, axis_y, half_extent: Vec3::new(1.5, 0.75, 0.25) }
         };
         let eighths = |random: &mut Random| Vec3::from([0; 3].map(|_| random.below(17) as f32 / 8.0 - 1.0));
         let vectors = |random: &mut Random| Mat3::from_cols(eighths(random), eighths(random), eighths(random));
@@ -62,7 +101,10 @@ impl Case {
             triangles: vec![UVec3::new(0, 1, 2), UVec3::new(2, 1, 3), UVec3::new(3, 1, 4)],
             offsets: vec![0, 1, 4, 6, 8, 9],
             incident: vec![0, 0, 1, 2, 0, 1, 1, 2, 2],
-            leaves: (0..4).map(|_| leaf(random)).collect(),
+            leaves: Leaves {
+                shapes: (0..4).map(|_| leaf(random)).collect(),
+                rows: vec![vec![1, 3], vec![0], vec![], vec![2, 0, 1]],
+            },
             triangle_leaves: vec![UVec2::new(0, 2), UVec2::new(1, 2), UVec2::new(3, NO_LEAF)],
             direct: (0..4 * FUNCTIONS).map(|_| vectors(random)).collect(),
             indirect: (0..4 * FUNCTIONS).map(|_| vectors(random)).collect(),
@@ -82,12 +124,7 @@ impl Case {
                 }
                 let [a, b, c] = self.triangles[triangle as usize].to_array().map(|v| self.positions[v as usize]);
                 let area = (b - a).cross(c - a).length();
-                let shape = &self.leaves[leaf as usize];
-                let offset = self.positions[vertex] - shape.center;
-                let along = Vec2::new(offset.dot(shape.axis_x), offset.dot(shape.axis_y)) / shape.half_extent;
-                let s = along.clamp(Vec2::NEG_ONE, Vec2::ONE) * 3.0f32.sqrt();
-                let functions = &vectors[leaf as usize * FUNCTIONS..][..FUNCTIONS];
-                let light = UNIT * (functions[0] + s.x * functions[1] + s.y * functions[2]);
+                let light = self.leaves.light(vectors, leaf as usize, self.positions[vertex]);
                 sum += area * (light.transpose() * normal).max(Vec3::ZERO);
                 area_sum += area;
             }
@@ -106,13 +143,15 @@ impl Case {
             triangles: &context.upload("test/triangles", &self.triangles).unwrap(),
             incident_offsets: &context.upload("test/offsets", &self.offsets).unwrap(),
             incident_triangles: &context.upload("test/incident", &self.incident).unwrap(),
-            leaves: &context.upload("test/leaves", &self.leaves).unwrap(),
+            leaves: &context.upload("test/leaves", &self.leaves.shapes).unwrap(),
             triangle_leaves: &context.upload("test/triangle leaves", &self.triangle_leaves).unwrap(),
             direct_vectors: &context.upload("test/direct", &halves(&self.direct)).unwrap(),
             indirect_vectors: &context.upload("test/indirect", &halves(&self.indirect)).unwrap(),
             direct_irradiance: &out[0],
             indirect_irradiance: &out[1],
-            params: ElementsParams { element_count: self.entries.len() as u32, unit: UNIT },
+            neighbour_offsets: &context.upload("test/rows", &self.leaves.row_starts()).unwrap(),
+            neighbours: &context.upload("test/neighbours", &self.leaves.rows.concat()).unwrap(),
+            params: ElementsParams { element_count: self.entries.len() as u32, unit: UNIT, reach: REACH },
             constants: ElementsConstants { irradiance_functions: FUNCTIONS as u32 },
         };
         let mut recorder = context.recorder("test").unwrap();
@@ -133,6 +172,8 @@ fn irradiance_of_elements_agrees_with_its_twin() {
         hold("direct", &direct, &expected, TOLERANCE);
         hold("indirect", &indirect, &case.twin(&case.indirect), TOLERANCE);
         tells_apart("the other vectors", &case.twin(&case.indirect), &expected, TOLERANCE);
+        let alone = Case { leaves: Leaves { rows: vec![Vec::new(); 4], ..case.leaves }, ..case };
+        tells_apart("without neighbours", &alone.twin(&alone.direct), &expected, TOLERANCE);
     }
     assert_eq!([1.0, -0.125, 8.0, 0.0].map(half), [0x3c00, 0xb000, 0x4800, 0]);
 }

@@ -26,7 +26,7 @@ void main()
     uint e = linear_index();
     if (e >= params.element_count || elements[e].children != NO_FACE_ELEMENT) return;
     uint leaf = leaf_indices[e];
-    leaves[leaf] = LeafElement(elements[e].center, elements[e].axis_x, elements[e].axis_y, elements[e].half_extent.xy);
+    leaves[leaf] = LeafElement(elements[e].center, elements[e].axis_x, elements[e].axis_y, elements[e].half_extent);
     for (uint k = 0; k < params.functions; ++k) {
         leaf_direct[leaf * params.functions + k] = packed(direct_irradiance[e * params.functions + k], params.inverse_unit);
         leaf_indirect[leaf * params.functions + k] = packed(indirect_irradiance[e * params.functions + k], params.inverse_unit);

@@ -5,15 +5,15 @@
 
 // One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
 // reads texels, albedo, the sender tree, the maps   writes irradiance (W/m2), cut_sizes [texel_count]   shared none
-layout(set = 0, binding = 0, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 0) uniform usamplerBuffer run_offsets;
+layout(set = 0, binding = 1) uniform usamplerBuffer runs;
 layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };       // by place
 layout(set = 0, binding = 3, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 layout(set = 0, binding = 4, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
 
-uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
-uint surface_run(uint index) { return runs[index]; }
+uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
+uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 vec3 surface_map_origin(uint place) { return map_origins[place]; }
 
 float visibility(vec3 origin, vec3 target, uint leaf)

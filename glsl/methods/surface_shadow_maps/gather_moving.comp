@@ -13,8 +13,8 @@
 layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;     // NODE_TEXELS each
 layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_TEXELS each, in leaf order
 layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
-layout(set = 0, binding = 17, scalar) readonly buffer RunOffsets { uint run_offsets[]; };
-layout(set = 0, binding = 18, scalar) readonly buffer Runs { uint runs[]; };
+layout(set = 0, binding = 17) uniform usamplerBuffer run_offsets;
+layout(set = 0, binding = 18) uniform usamplerBuffer runs;
 layout(set = 0, binding = 19, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place, at rest
 layout(set = 0, binding = 20, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 layout(set = 0, binding = 21, scalar) readonly buffer RigidWords { uint rigid_words[]; };
@@ -22,8 +22,8 @@ layout(set = 0, binding = 22, scalar) readonly buffer RigidObjects { RigidObject
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
-uint surface_run_offset(uint pixel) { return run_offsets[pixel]; }
-uint surface_run(uint index) { return runs[index]; }
+uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
+uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 uint rigid_word(uint i) { return rigid_words[i]; }
 RigidObject rigid_object(uint i) { return rigid_objects[i]; }
 

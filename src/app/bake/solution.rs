@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::app::AppError;
 use crate::app::frame::Solved;
+use crate::app::on_clusters::AtVertices;
 use crate::app::on_elements::OnElements;
 use crate::app::render::{LightParts, RenderRequest};
 use crate::app::stage::Stage;
@@ -12,12 +13,9 @@ use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
 use crate::scene::atlas::{Atlas, NO_TEXEL};
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::irradiance_vector::ElementLight as LeafLight;
-use crate::stages::punctual;
 
 /// Rays start off their surface by so much of the scene's extent.
 const RAY_OFFSET: f32 = 1e-5;
-/// Shadow rays of a batch.
-const SHADOW_RAYS: usize = 1 << 19;
 
 /// What the elements at the vertices receive, reflect and emit. Element `v` is the front of vertex `v`.
 pub struct ElementLight {
@@ -80,23 +78,13 @@ impl ElementLight {
         stage: &Stage,
         light: LeafLight<'_>,
     ) -> Result<Self, AppError> {
-        let topology = ElementTopology::new(&stage.scene, &stage.geometry, &stage.rest_positions);
-        let elements = Elements::new(context, topology, &stage.rest_positions, &stage.world, RAY_OFFSET)?;
-        let count = elements.count as usize;
-        let irradiance = |name: &str| context.buffer::<Vec3>(&format!("bake/{name}"), count);
-        let (direct, indirect, lights) = (irradiance("direct")?, irradiance("indirect")?, irradiance("lights")?);
-        let light_count = stage.world.light_count as usize;
-        let visibility = context.buffer("bake/visibility", (light_count * count).max(1))?;
-        let rays = context.buffer("bake/rays", SHADOW_RAYS)?;
-        let is_free = context.buffer("bake/is free", SHADOW_RAYS)?;
+        let at_vertices = AtVertices::new(context, stage)?;
         let mut recorder = context.recorder("bake")?;
-        light.at_elements(&mut recorder, &stage.world, &elements, [&direct, &indirect]);
-        let (tracer, world) = (stage.tracer(), &stage.world);
-        punctual::trace_visibility(&mut recorder, &tracer, world, &elements, &rays, &is_free, &visibility);
-        punctual::irradiance(&mut recorder, world, &elements, &visibility, &lights);
+        at_vertices.fill(&mut recorder, stage, light);
         recorder.submit()?;
-        let direct = sum(&[context.download(&direct)?, context.download(&lights)?]);
-        let indirect = context.download(&indirect)?;
+        let AtVertices { elements, punctual, direct, indirect } = &at_vertices;
+        let direct = sum(&[context.download(direct)?, context.download(punctual)?]);
+        let indirect = context.download(indirect)?;
         Ok(Self {
             irradiance: parts(request, &direct, &indirect),
             whole_irradiance: sum(&[direct, indirect]),

@@ -5,7 +5,7 @@ use glam::{DVec3, UVec2, Vec2, Vec3};
 use super::probe::{Probe, Seen};
 use super::{Frame, Parts, add};
 use crate::app::AppError;
-use crate::app::frame::{FaceClustersShown, cluster_stage};
+use crate::app::on_clusters::{ClustersShown, cluster_stage};
 use crate::display::direct::Canvas;
 use crate::display::irradiance_vector;
 use crate::gpu::shaders::types::HalfVectors;
@@ -17,7 +17,7 @@ use crate::stages::irradiance_vector::ElementLight;
 
 pub fn explain(
     frame: Frame<'_>,
-    shown: &mut FaceClustersShown,
+    shown: &mut ClustersShown,
     pixel: UVec2,
     parts: &mut Parts,
 ) -> Result<Vec<String>, AppError> {
@@ -26,7 +26,7 @@ pub fn explain(
     let mut names = Vec::new();
     let mut before = [DVec3::ZERO; 2];
     for bounces in 0..=request.bounces {
-        let FaceClustersShown { method, shadow_maps, g_buffer } = &mut *shown;
+        let ClustersShown { method, shadow_maps, g_buffer, .. } = &mut *shown;
         method.solve(context, &cluster_stage(stage, None, watch), bounces).map_err(AppError::failed)?;
         let solution = method.keep(context).map_err(AppError::failed)?;
         let light = method.light(&solution);
@@ -60,8 +60,9 @@ pub fn explain(
     Ok(names)
 }
 
-/// What a sample shows of the direct and indirect vectors of its leaf, and the leaf: on the host for diffuse surfaces,
-/// as `display/irradiance_vector` computes it; by that pass for others.
+/// What a sample shows of the direct and indirect vectors of its leaf, and the leaf: on the host for diffuse surfaces
+/// of leaves that keep their light within their borders, as `display/irradiance_vector` computes it; by that pass for
+/// others.
 fn radiance(
     probe: &Probe<'_>,
     light: &ElementLight<'_>,
@@ -75,7 +76,7 @@ fn radiance(
     if leaf == u32::MAX {
         return Ok(([DVec3::ZERO; 2], leaf));
     }
-    if !seen.is_diffuse || light.per_vertex {
+    if !seen.is_diffuse || light.per_vertex || light.reach > 0.0 {
         let (film, at) = (probe.canvas.film, (probe.pixel.y * probe.canvas.film.width + probe.pixel.x) as usize);
         let indirect = probe.reflectance(seen, |recorder, view, weight| {
             irradiance_vector::add(recorder, *light, probe.canvas, view, weight);
@@ -86,7 +87,7 @@ fn radiance(
     let element = context.download_range(light.leaves, leaf as usize..leaf as usize + 1)?[0];
     let offset = seen.position - element.center;
     let along = Vec2::new(offset.dot(element.axis_x), offset.dot(element.axis_y));
-    let uv = (0.5 + 0.5 * along / element.half_extent.max(Vec2::splat(1e-30))).clamp(Vec2::ZERO, Vec2::ONE);
+    let uv = (0.5 + 0.5 * along / element.half_extent.truncate().max(Vec2::splat(1e-30))).clamp(Vec2::ZERO, Vec2::ONE);
     let reflectance = seen.albedo / std::f32::consts::PI / probe.canvas.samples as f32;
     let shine = |buffer| -> Result<DVec3, AppError> {
         let vectors = at_place(context, light, buffer, leaf, uv)?;

@@ -64,7 +64,7 @@ pub fn explain(frame: Frame<'_>, method: &mut Method, pixel: UVec2) -> Result<Ex
     let seen = match method {
         Method::OnElements(shown) if shown.gather.is_none() => elements::explain(frame, shown, pixel, &mut parts)?,
         Method::OnTexels(shown) if shown.lightmap().is_some() => texels::explain(frame, shown, pixel, &mut parts)?,
-        Method::FaceClusters(shown) => clusters::explain(frame, shown, pixel, &mut parts)?,
+        Method::OnClusters(shown) if shown.gather.is_none() => clusters::explain(frame, shown, pixel, &mut parts)?,
         _ => bounces::explain(frame, method, pixel, &mut parts)?,
     };
     let entry = |((light, bounce, source, receiver), (count, radiance))| Entry {

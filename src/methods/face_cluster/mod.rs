@@ -109,8 +109,8 @@ crate::settings! {
         shading: Shading = Shading::Pixel, paper "vertex; pixel announced";
         /// GGX alpha of the narrowest lobe: one direction a channel stands for all light.
         least_alpha: f32 = 0.2, range 0.001..=1.0, paper "moderately glossy: a Phong exponent of 10, alpha 0.41";
-        /// Make light meet at the corners of leaves: the mean of all that meet there, bilinear in between.
-        smooth_corners: bool = false, paper "not done; named as Willmott's post-pass";
+        /// How far the light of a leaf reaches over its border, blended with that of the leaves there; 0: in steps.
+        leaf_reach: f32 = 0.5, range 0.0..=1.0, unit "half sides", paper "not done; a post-pass is named";
         /// What the picture shows.
         show: Shown = Shown::Light, paper "light, and leaf clusters";
     }

@@ -8,15 +8,12 @@
 use super::{FaceClusterError, FaceClusters, Stage};
 use crate::gpu::shaders::methods::face_cluster as passes;
 use crate::gpu::shaders::types::{HalfVectors, LeafElement};
-use crate::gpu::{Buffer, Context};
+use crate::gpu::{Buffer, Context, Recorder};
 use crate::stages::scan;
 use glam::Vec3;
 
 /// The largest half float that all light together may come to: four times less than there are.
 const MOST_UNITS: f32 = 16384.0;
-
-/// Functions of light that is bilinear between corners.
-const CORNERS: u32 = 4;
 
 /// Light on leaves; their number is that of [`super::State::triangle_leaves`].
 pub struct Solution {
@@ -27,7 +24,10 @@ pub struct Solution {
     pub indirect: Buffer<HalfVectors>,
     /// W/m2.
     pub unit: f32,
-    pub functions: u32,
+    /// Per leaf, and one more: where the row of leaves whose light reaches it starts.
+    pub neighbour_offsets: Buffer<u32>,
+    /// One entry, not looked at, where light reaches over no border.
+    pub neighbours: Buffer<u32>,
     /// False colours per leaf; one entry, not looked at, where the picture shows light.
     pub colors: Buffer<Vec3>,
 }
@@ -35,7 +35,8 @@ pub struct Solution {
 impl Solution {
     /// Without what tells triangles their leaves, which is the model's.
     pub fn size_bytes(&self) -> u64 {
-        self.leaves.size_bytes() + self.direct.size_bytes() + self.indirect.size_bytes()
+        let rows = self.neighbour_offsets.size_bytes() + self.neighbours.size_bytes();
+        self.leaves.size_bytes() + self.direct.size_bytes() + self.indirect.size_bytes() + rows
     }
 }
 
@@ -73,17 +74,17 @@ impl FaceClusters {
 
     /// What is to be shown of what was solved and located; everything else is given back.
     pub fn keep(&mut self, context: &Context) -> Result<Solution, FaceClusterError> {
-        let (s, own) = (&self.state, self.settings.irradiance_basis.functions());
-        let is_smooth = self.settings.smooth_corners;
-        let functions = if is_smooth { CORNERS } else { own };
+        let (s, functions) = (&self.state, self.settings.irradiance_basis.functions());
         let leaves = self.report.leaves as usize;
         let unit = (self.most_light / MOST_UNITS).max(f32::MIN_POSITIVE);
+        let (neighbour_offsets, neighbours) = self.neighbours(context)?;
         let solution = Solution {
             leaves: context.buffer("face-cluster/leaves", leaves)?,
             direct: context.buffer("face-cluster/leaf direct", leaves * functions as usize)?,
             indirect: context.buffer("face-cluster/leaf indirect", leaves * functions as usize)?,
             unit,
-            functions,
+            neighbour_offsets,
+            neighbours,
             colors: self.colors(context)?,
         };
         let mut recorder = context.recorder("face-cluster")?;
@@ -97,28 +98,44 @@ impl FaceClusters {
             leaf_indirect: &solution.indirect,
             params: passes::KeepLeavesParams {
                 element_count: self.report.elements,
-                // Smoothed light has a kernel of its own.
-                functions: if is_smooth { 0 } else { own },
+                functions,
                 inverse_unit: 1.0 / unit,
             },
         };
         recorder.dispatch(&pass, self.report.elements);
-        if is_smooth {
-            let pass = passes::SmoothLeaves {
-                elements: &s.elements,
-                leaf_indices: &s.leaf_indices,
-                direct_irradiance: &s.direct,
-                indirect_irradiance: &s.indirect,
-                leaf_direct: &solution.direct,
-                leaf_indirect: &solution.indirect,
-                params: passes::SmoothLeavesParams { element_count: self.report.elements, inverse_unit: 1.0 / unit },
-                constants: passes::SmoothLeavesConstants { irradiance_functions: own },
-            };
-            recorder.dispatch(&pass, self.report.elements);
-        }
         recorder.submit()?;
         self.report.solution_bytes = solution.size_bytes();
         self.state.shrink(context, &self.settings, self.placement.instance_count)?;
         Ok(solution)
+    }
+
+    /// Rows of the leaves whose light reaches each leaf: where they start, and they.
+    fn neighbours(&self, context: &Context) -> Result<(Buffer<u32>, Buffer<u32>), FaceClusterError> {
+        let (s, leaves) = (&self.state, self.report.leaves as usize);
+        let (offsets, none) = (context.buffer("face-cluster/neighbour offsets", leaves + 1)?, context.upload("face-cluster/neighbours", &[0])?);
+        let reach = self.settings.leaf_reach;
+        if reach <= 0.0 {
+            return Ok((offsets, none));
+        }
+        let find = |recorder: &mut Recorder<'_>, neighbours: &Buffer<u32>, writes: u32| {
+            let pass = passes::FindNeighbours {
+                elements: &s.elements,
+                leaf_indices: &s.leaf_indices,
+                neighbour_offsets: &offsets,
+                neighbours,
+                params: passes::FindNeighboursParams { element_count: self.report.elements, reach, writes },
+            };
+            recorder.dispatch(&pass, self.report.elements);
+        };
+        let mut recorder = context.recorder("face-cluster")?;
+        find(&mut recorder, &none, 0);
+        scan::exclusive(&mut recorder, &offsets, leaves + 1, &s.scan);
+        recorder.submit()?;
+        let count = context.download_range(&offsets, leaves..leaves + 1)?[0];
+        let neighbours = context.buffer("face-cluster/neighbours", count.max(1) as usize)?;
+        let mut recorder = context.recorder("face-cluster")?;
+        find(&mut recorder, &neighbours, 1);
+        recorder.submit()?;
+        Ok((offsets, neighbours))
     }
 }

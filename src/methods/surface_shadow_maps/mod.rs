@@ -208,7 +208,9 @@ impl SurfaceShadowMaps {
         let apart = Apart::of(context, stage, &settings)?;
         let positions = if apart.is_some() { stage.rest_positions } else { stage.positions };
         let mut atlas = make_atlas(stage, positions, settings.atlas_resolution)?;
-        let ray_offset = map_offset(stage.bounds);
+        // Maps of objects apart hold in every pose, and so must all that they are measured by.
+        let bounds = if apart.is_some() { bounds_of(stage.rest_positions) } else { stage.bounds };
+        let ray_offset = map_offset(bounds);
         let tracers = apart.as_ref().map_or(vec![stage.tracer], |apart| apart.tracers(stage));
         let triangle_objects = apart.as_ref().map_or(&[][..], |apart| &apart.objects.triangle_objects);
         let seen = Seen { tracers: &tracers, triangle_objects, ray_offset };
@@ -216,7 +218,7 @@ impl SurfaceShadowMaps {
         let texels = Texels::new(context, &atlas, stage.world, ray_offset)?;
         let tree = SenderTree::build(context, &texels::leaves(&atlas), settings.tree_options())?;
         let maps = match settings.visibility {
-            TexelVisibility::Maps => Some(make_maps(context, stage, &atlas, &tree, &settings, apart.as_ref())?),
+            TexelVisibility::Maps => Some(make_maps(context, &Stage { bounds, ..*stage }, &atlas, &tree, &settings, apart.as_ref())?),
             TexelVisibility::Rays => None,
         };
         let state = State::new(context, texels.count as usize)?;
@@ -315,6 +317,10 @@ impl SurfaceShadowMaps {
             map_rays: maps.map_or(0, |maps| maps.ray_count),
         }
     }
+}
+
+fn bounds_of(positions: &[Vec3]) -> [Vec3; 2] {
+    positions.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], &p| [low.min(p), high.max(p)])
 }
 
 fn make_atlas(stage: &Stage<'_>, positions: &[Vec3], resolution: u32) -> Result<Atlas, AtlasError> {

@@ -33,7 +33,7 @@ use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
 use crate::gpu::shaders::surface_maps as passes;
 use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::scene::atlas::Atlas;
 use glam::Vec3;
 use std::ops::Range;
@@ -88,8 +88,8 @@ pub struct SurfaceMaps {
     pub places: Vec<u32>,
     /// Where the maps stand, by place, metres.
     pub origins: Buffer<Vec3>,
-    pub run_offsets: Buffer<u32>,
-    pub runs: Buffer<u32>,
+    pub run_offsets: TexelBuffer,
+    pub runs: TexelBuffer,
     /// How the runs lie in both.
     packing: Packing,
     pub codes_per_metre: f32,
@@ -101,12 +101,13 @@ pub struct SurfaceMaps {
 struct Packing {
     block_bits: u32,
     block_count: u32,
+    /// Texels.
     firsts_at: u32,
 }
 
 impl Packing {
     fn of(packed: &PackedRuns) -> Self {
-        Self { block_bits: packed.block_bits, block_count: packed.block_count, firsts_at: packed.firsts_at }
+        Self { block_bits: packed.block_bits, block_count: packed.block_count, firsts_at: packed.firsts_at / 4 }
     }
 }
 
@@ -183,8 +184,8 @@ impl SurfaceMaps {
             options,
             places,
             origins: context.upload("surface_maps/origins", &origins)?,
-            run_offsets: context.upload("surface_maps/run offsets", &packed.offsets)?,
-            runs: context.upload("surface_maps/runs", &packed.words)?,
+            run_offsets: texels(context, "surface_maps/run offsets", &packed.offsets)?,
+            runs: texels(context, "surface_maps/runs", &packed.words)?,
             packing: Packing::of(&packed),
             maps,
             codes_per_metre,
@@ -206,8 +207,8 @@ impl SurfaceMaps {
     /// The same maps in blocks of 256 places (8) or of 65536 (16).
     pub fn repack(&mut self, context: &Context, block_bits: u32) -> Result<(), GpuError> {
         let packed = PackedRuns::of(&self.maps, block_bits);
-        self.run_offsets = context.upload("surface_maps/run offsets", &packed.offsets)?;
-        self.runs = context.upload("surface_maps/runs", &packed.words)?;
+        self.run_offsets = texels(context, "surface_maps/run offsets", &packed.offsets)?;
+        self.runs = texels(context, "surface_maps/runs", &packed.words)?;
         self.packing = Packing::of(&packed);
         Ok(())
     }
@@ -249,6 +250,17 @@ impl SurfaceMaps {
         };
         recorder.dispatch(&pass, count);
     }
+}
+
+/// The words as texels of four, zeros behind the last.
+fn texels(context: &Context, name: &str, words: &[u32]) -> Result<TexelBuffer, GpuError> {
+    let texels: Vec<[u32; 4]> = words
+        .chunks(4)
+        .map(|words| std::array::from_fn(|k| words.get(k).copied().unwrap_or(0)))
+        .collect();
+    let buffer = context.texel_buffer(name, texels.len().max(1))?;
+    context.write(buffer.buffer(), &texels)?;
+    Ok(buffer)
 }
 
 /// The maps of all places before compression, one after the other: what tests hold the compressed ones against.
@@ -324,10 +336,15 @@ struct Maker<'a> {
 
 /// Buffers of a chunk.
 struct Chunk {
+    intervals: Buffer<u32>,
+    /// What the device's own traversal is asked by; ours needs no lists.
+    lists: Option<RayLists>,
+}
+
+struct RayLists {
     rays: Buffer<Ray>,
     hits: Buffer<Hit>,
     second_hits: Buffer<Hit>,
-    intervals: Buffer<u32>,
 }
 
 impl Maker<'_> {
@@ -361,11 +378,17 @@ impl Maker<'_> {
         let map_origins = context.upload("surface_maps/origins", origins)?;
         let map_normals = context.upload("surface_maps/normals", normals)?;
         let ray_count = chunk_places * pixel_count;
+        let has_lists = self.legs.iter().any(|(_, tracer)| matches!(tracer, Tracer::RayQuery(..)));
+        let lists = || -> Result<RayLists, GpuError> {
+            Ok(RayLists {
+                rays: context.buffer("surface_maps/rays", ray_count)?,
+                hits: context.buffer("surface_maps/hits", ray_count)?,
+                second_hits: context.buffer("surface_maps/second hits", ray_count)?,
+            })
+        };
         let chunk = Chunk {
-            rays: context.buffer("surface_maps/rays", ray_count)?,
-            hits: context.buffer("surface_maps/hits", ray_count)?,
-            second_hits: context.buffer("surface_maps/second hits", ray_count)?,
             intervals: context.buffer("surface_maps/intervals", ray_count)?,
+            lists: has_lists.then(lists).transpose()?,
         };
         let chunks = self.legs.iter().flat_map(|(places, tracer)| {
             let end = places.end;
@@ -393,28 +416,45 @@ impl Maker<'_> {
         first_place: u32,
         chunk_count: u32,
     ) {
-        let resolution = self.options.resolution;
+        let (resolution, intervals) = (self.options.resolution, &chunk.intervals);
+        let (codes_per_metre, bias) = (self.codes_per_metre, self.options.bias);
         let ray_count = 6 * resolution * resolution * chunk_count;
-        let rays = &chunk.rays;
-        let params = passes::CubeRaysParams { first_place, chunk_count, resolution };
-        recorder.dispatch(&passes::CubeRays { map_origins, map_normals, rays, params }, ray_count);
-        trace::closest_hit(recorder, tracer, rays, &chunk.hits, ray_count as usize);
-        let params = passes::SecondRaysParams { ray_count, gap: self.gap };
-        recorder.dispatch(&passes::SecondRays { hits: &chunk.hits, rays, params }, ray_count);
-        trace::closest_hit(recorder, tracer, rays, &chunk.second_hits, ray_count as usize);
-        let pass = passes::Intervals {
-            map_normals,
-            hits: &chunk.hits,
-            second_hits: &chunk.second_hits,
-            intervals: &chunk.intervals,
-            params: passes::IntervalsParams {
-                first_place,
-                chunk_count,
-                resolution,
-                codes_per_metre: self.codes_per_metre,
-                bias: self.options.bias,
-            },
-        };
-        recorder.dispatch(&pass, ray_count);
+        match (tracer, &chunk.lists) {
+            (Tracer::RayQuery(..), Some(RayLists { rays, hits, second_hits })) => {
+                let params = passes::CubeRaysParams { first_place, chunk_count, resolution };
+                recorder.dispatch(&passes::CubeRays { map_origins, map_normals, rays, params }, ray_count);
+                trace::closest_hit(recorder, tracer, rays, hits, ray_count as usize);
+                let params = passes::SecondRaysParams { ray_count, gap: self.gap };
+                recorder.dispatch(&passes::SecondRays { hits, rays, params }, ray_count);
+                trace::closest_hit(recorder, tracer, rays, second_hits, ray_count as usize);
+                let params = passes::IntervalsParams { first_place, chunk_count, resolution, codes_per_metre, bias };
+                recorder.dispatch(&passes::Intervals { map_normals, hits, second_hits, intervals, params }, ray_count);
+            }
+            (Tracer::Compute(bvh, surfaces), _) => {
+                let pass = passes::Depths {
+                    bvh_nodes: bvh.nodes(),
+                    bvh_triangles: bvh.triangles(),
+                    map_origins,
+                    triangles: surfaces.triangles,
+                    triangle_materials: surfaces.triangle_materials,
+                    attributes: surfaces.attributes,
+                    materials: surfaces.materials,
+                    textures: surfaces.textures,
+                    map_normals,
+                    intervals,
+                    params: passes::DepthsParams {
+                        first_place,
+                        chunk_count,
+                        resolution,
+                        codes_per_metre,
+                        bias,
+                        gap: self.gap,
+                    },
+                    constants: passes::DepthsConstants { alpha_test: surfaces.has_holes },
+                };
+                recorder.dispatch(&pass, ray_count);
+            }
+            (Tracer::RayQuery(..), None) => debug_assert!(false, "a chunk for the device's traversal has lists"),
+        }
     }
 }
