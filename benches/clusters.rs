@@ -143,7 +143,10 @@ fn by_size(_: &mut Criterion) {
     );
     for Row { report, solve, shown } in &rows[PAPERS - 1..] {
         let (triangles, ratio) = (report.triangles, shown.all / shown.raster);
-        println!("{triangles} triangles: solve {:.2} of the smallest's, picture / rasterising {ratio:.2}", solve / rows[0].solve);
+        println!(
+            "{triangles} triangles: solve {:.2} of the smallest's, picture / rasterising {ratio:.2}",
+            solve / rows[0].solve
+        );
     }
 }
 

@@ -121,9 +121,7 @@ impl Method {
             "surface-shadow-maps" => {
                 Ok(Self::OnTexels(Box::new(TexelsShown::prepare(context, request, stage, watch)?)))
             }
-            "face-cluster" => {
-                Ok(Self::OnClusters(Box::new(ClustersShown::prepare(context, request, stage, watch)?)))
-            }
+            "face-cluster" => Ok(Self::OnClusters(Box::new(ClustersShown::prepare(context, request, stage, watch)?))),
             other => Err(AppError::failed(format!("method {other} cannot be rendered"))),
         }
     }

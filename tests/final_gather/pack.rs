@@ -86,7 +86,8 @@ fn compact_nodes_are_those_of_a_plain_loop_and_hold_the_wide_ones() {
         tree
     };
     let [wide, compact] = [NodeLayout::Wide, NodeLayout::Compact].map(build);
-    let vec3 = |texel: [u32; 4]| Vec3::new(f32::from_bits(texel[0]), f32::from_bits(texel[1]), f32::from_bits(texel[2]));
+    let vec3 =
+        |texel: [u32; 4]| Vec3::new(f32::from_bits(texel[0]), f32::from_bits(texel[1]), f32::from_bits(texel[2]));
     let (nodes, light) =
         (context.download(wide.nodes().0.buffer()).unwrap(), context.download(wide.light.buffer()).unwrap());
     let wide: Vec<Wide> = (nodes.chunks(3).zip(light.chunks(2)))
@@ -136,6 +137,10 @@ fn compact_nodes_are_those_of_a_plain_loop_and_hold_the_wide_ones() {
         assert!(cone + 1e-3 >= needed.min(PI), "{cone} for {needed}");
         let scale = frame.largest_power * (((code[8] >> 18) as f32 - 63.0) * 0.5).exp2() / 63.0;
         let power = scale * UVec3::new(code[8] & 63, code[8] >> 6 & 63, code[8] >> 12 & 63).as_vec3();
-        assert!((power - node.power).abs().max_element() <= 0.012 * node.power.max_element(), "{power} for {}", node.power);
+        assert!(
+            (power - node.power).abs().max_element() <= 0.012 * node.power.max_element(),
+            "{power} for {}",
+            node.power
+        );
     }
 }

@@ -33,7 +33,12 @@ impl Lit {
         let mut case = case(lens);
         case.pose.lights.clear();
         let random = &mut Random(77);
-        let flat = |center: Vec3, axis_y: Vec3, half_extent: Vec3| LeafElement { center, axis_x: Vec3::X, axis_y, half_extent };
+        let flat = |center: Vec3, axis_y: Vec3, half_extent: Vec3| LeafElement {
+            center,
+            axis_x: Vec3::X,
+            axis_y,
+            half_extent,
+        };
         let half = Vec3::new(1.0, 2.0, 0.01);
         let panels = flat(Vec3::new(0.0, 0.5, -2.1), Vec3::Y, Vec3::new(2.0, 0.6, 0.1));
         let shapes = vec![
@@ -52,10 +57,12 @@ impl Lit {
         // Mostly from above and from the front; eighths are halves exactly.
         let mut vectors = || -> Vec<Mat3> {
             let mut eighth = |low: f32| low + random.below(9) as f32 / 8.0;
-            let constant = |at: &mut dyn FnMut(f32) -> f32| Mat3::from_cols_array(&[-0.5, 0.5, 0.5].repeat(3).iter().map(|&low| at(low)).collect::<Vec<_>>().try_into().unwrap());
-            (0..4 * FUNCTIONS)
-                .map(|k| constant(&mut eighth) * if k % FUNCTIONS == 0 { 4.0 } else { 0.5 })
-                .collect()
+            let constant = |at: &mut dyn FnMut(f32) -> f32| {
+                Mat3::from_cols_array(
+                    &[-0.5, 0.5, 0.5].repeat(3).iter().map(|&low| at(low)).collect::<Vec<_>>().try_into().unwrap(),
+                )
+            };
+            (0..4 * FUNCTIONS).map(|k| constant(&mut eighth) * if k % FUNCTIONS == 0 { 4.0 } else { 0.5 }).collect()
         };
         let (direct, indirect) = (vectors(), vectors());
         Self { case, leaves: Leaves { shapes, rows }, triangle_leaves, direct, indirect }

@@ -88,10 +88,8 @@ fn texels_are_lit_as_plain_loops_light_them() {
             let light = light as u32;
             let mut recorder = context.recorder("test").unwrap();
             let params = LightRaysParams { first_texel, batch_count, sample_count, light, ray_offset: OFFSET };
-            recorder.dispatch(
-                &LightRays { texels: &texel_buffer, lights: &light_buffer, rays: &rays, params },
-                free.len(),
-            );
+            recorder
+                .dispatch(&LightRays { texels: &texel_buffer, lights: &light_buffer, rays: &rays, params }, free.len());
             let params = LightIrradianceParams { first_texel, batch_count, sample_count, light };
             let (texel_table, light_table) = (&texel_buffer, &light_buffer);
             let pass = LightIrradiance {
@@ -120,7 +118,8 @@ fn texels_are_lit_as_plain_loops_light_them() {
                     for (ray, &free) in rays.iter().zip(&free[index * sample_count as usize..]) {
                         let (light, towards, _) = arriving(of, ray.origin);
                         if ray.t_max >= 0.0 && free != 0 {
-                            lit[first_texel as usize + index] += light * texel.normal.dot(towards) / sample_count as f32;
+                            lit[first_texel as usize + index] +=
+                                light * texel.normal.dot(towards) / sample_count as f32;
                         }
                     }
                 }
@@ -190,7 +189,9 @@ fn rays_to_the_environment_are_those_of_plain_loops() {
             let direction = basis_of(texel.normal) * cosine_hemisphere(u);
             Ray { origin: point(texel, k) + OFFSET * texel.normal, t_min: 0.0, direction, t_max: 3e38 }
         };
-        (first_texel..first_texel + batch_count).flat_map(|index| (0..sample_count).map(move |k| ray(index, k))).collect()
+        (first_texel..first_texel + batch_count)
+            .flat_map(|index| (0..sample_count).map(move |k| ray(index, k)))
+            .collect()
     };
     hold("rays", &context.download(&rays).unwrap(), &twin(0), TOLERANCE);
     tells_apart("another texel's directions", &twin(1), &twin(0), TOLERANCE);

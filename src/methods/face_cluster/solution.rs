@@ -112,7 +112,10 @@ impl FaceClusters {
     /// Rows of the leaves whose light reaches each leaf: where they start, and they.
     fn neighbours(&self, context: &Context) -> Result<(Buffer<u32>, Buffer<u32>), FaceClusterError> {
         let (s, leaves) = (&self.state, self.report.leaves as usize);
-        let (offsets, none) = (context.buffer("face-cluster/neighbour offsets", leaves + 1)?, context.upload("face-cluster/neighbours", &[0])?);
+        let (offsets, none) = (
+            context.buffer("face-cluster/neighbour offsets", leaves + 1)?,
+            context.upload("face-cluster/neighbours", &[0])?,
+        );
         let reach = self.settings.leaf_reach;
         if reach <= 0.0 {
             return Ok((offsets, none));

@@ -218,7 +218,9 @@ impl SurfaceShadowMaps {
         let texels = Texels::new(context, &atlas, stage.world, ray_offset)?;
         let tree = SenderTree::build(context, &texels::leaves(&atlas), settings.tree_options())?;
         let maps = match settings.visibility {
-            TexelVisibility::Maps => Some(make_maps(context, &Stage { bounds, ..*stage }, &atlas, &tree, &settings, apart.as_ref())?),
+            TexelVisibility::Maps => {
+                Some(make_maps(context, &Stage { bounds, ..*stage }, &atlas, &tree, &settings, apart.as_ref())?)
+            }
             TexelVisibility::Rays => None,
         };
         let state = State::new(context, texels.count as usize)?;

@@ -254,10 +254,8 @@ impl SurfaceMaps {
 
 /// The words as texels of four, zeros behind the last.
 fn texels(context: &Context, name: &str, words: &[u32]) -> Result<TexelBuffer, GpuError> {
-    let texels: Vec<[u32; 4]> = words
-        .chunks(4)
-        .map(|words| std::array::from_fn(|k| words.get(k).copied().unwrap_or(0)))
-        .collect();
+    let texels: Vec<[u32; 4]> =
+        words.chunks(4).map(|words| std::array::from_fn(|k| words.get(k).copied().unwrap_or(0))).collect();
     let buffer = context.texel_buffer(name, texels.len().max(1))?;
     context.write(buffer.buffer(), &texels)?;
     Ok(buffer)
