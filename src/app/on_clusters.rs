@@ -50,7 +50,11 @@ pub struct AtVertices {
 }
 
 /// What the method sees of a staged scene.
-pub(super) fn cluster_stage<'a>(stage: &'a Stage, cache: Option<&'a Path>, watch: &'a dyn Watch) -> face_cluster::Stage<'a> {
+pub(super) fn cluster_stage<'a>(
+    stage: &'a Stage,
+    cache: Option<&'a Path>,
+    watch: &'a dyn Watch,
+) -> face_cluster::Stage<'a> {
     face_cluster::Stage {
         scene: &stage.scene,
         geometry: &stage.geometry,
