@@ -30,7 +30,18 @@ struct ReceiverGroup {
     uint above_first;   // the same of the parents' group
     uint above_count;   // 0: nothing above receives in this window
     uint above_node;
+    uint row;           // of the first node, in the table of bins
 };
+
+// How far a group has walked over all senders, and how many it holds for linking, by kind.
+struct GroupWalk {
+    uint step;
+    uint left_from_above;   // step from which on the group above did not look
+    uvec3 held;
+};
+const uint OF_LEAVES = 0;       // senders that are leaves, seen by their triangles
+const uint OF_PLANES = 1;       // nodes about a plane, seen by their ellipses
+const uint OF_OUTLINES = 2;     // nodes without one, seen by their outlines
 
 // What was counted while links were made.
 struct LinkCounts {

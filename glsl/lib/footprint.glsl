@@ -23,24 +23,31 @@ ivec2 cells_between(vec2 range, uint n)
     return clamp(ivec2(ceil(at.x), floor(at.y)), ivec2(0, -1), ivec2(n, int(n) - 1));
 }
 
+// The faces that a sphere may reach over to, bits: beside the face that its centre lies in, those beyond the rims that it
+// crosses.
+uint faces_around(vec3 offset, float reach, uint main_face)
+{
+    vec3 at = in_face(main_face, offset);
+    if (at.z <= reach) return 63;       // it reaches beside or behind the eye
+    vec2 range_u = slope_range(at.x, at.z, reach), range_v = slope_range(at.y, at.z, reach);
+    uint axis = main_face >> 1, beside_u = 2 * (axis == 2 ? 0 : axis + 1), beside_v = 2 * (axis == 0 ? 2 : axis - 1);
+    return 1u << main_face | (range_u.y >= 1.0 ? 1u << beside_u : 0u) | (range_u.x <= -1.0 ? 2u << beside_u : 0u)
+           | (range_v.y >= 1.0 ? 1u << beside_v : 0u) | (range_v.x <= -1.0 ? 2u << beside_v : 0u);
+}
+
 // Looks at the bins whose centres a sphere of radius `reach` at `offset` may cover.
 void look_around(vec3 offset, float reach, uint n)
 {
     bool is_inside = dot(offset, offset) <= reach * reach;
-    // The face that the centre lies in first: few senders reach over to others.
-    uint main_face = face_of(offset), face = main_face;
-    for (uint k = 0; k < 6; ++k) {
+    uint faces = faces_around(offset, reach, face_of(offset));
+    while (faces != 0) {
+        uint face = uint(findLSB(faces));
+        faces &= faces - 1;
         vec3 at = in_face(face, offset);
-        vec2 range_u = vec2(-1.0, 1.0), range_v = vec2(-1.0, 1.0);
-        if (!is_inside) {
-            range_u = slope_range(at.x, at.z, reach);
-            range_v = slope_range(at.y, at.z, reach);
-        }
+        vec2 range_u = is_inside ? vec2(-1.0, 1.0) : slope_range(at.x, at.z, reach);
+        vec2 range_v = is_inside ? vec2(-1.0, 1.0) : slope_range(at.y, at.z, reach);
         ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
         if (columns.x <= columns.y && rows.x <= rows.y) look_at(face, columns, rows);
-        bool stays = range_u.x > -1.0 && range_u.y < 1.0 && range_v.x > -1.0 && range_v.y < 1.0;
-        if (k == 0 && stays) break;
-        face = k < main_face ? k : k + 1;       // then all others in turn
     }
 }
 #endif

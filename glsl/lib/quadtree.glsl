@@ -58,6 +58,12 @@ struct WalkStep {
     uint skip;
 };
 
+// The same with what the walk looks at, in texels:
+//   0: centre (m) | radius (m)
+//   1: normal | extent (m)
+//   2: node | skip | thickness (m) | cos_cone
+const uint WALK_TEXELS = 3;
+
 // Children of a node: the first, and how many.
 uvec2 quadtree_children(QuadtreeSegment s, uint node)
 {

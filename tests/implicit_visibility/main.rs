@@ -2,9 +2,16 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../kernels/compare.rs"]
+#[allow(dead_code, reason = "each test file uses its own part")]
+mod compare;
 mod dynamics;
 mod fixture;
+mod gloss_twins;
 mod glossy;
+mod glossy_picture;
+mod holes;
+mod lobe_light;
 mod oracle;
 mod passes;
 mod physics;

@@ -6,7 +6,7 @@
 // One thread per leaf of a window: irradiance from the winners of its bins.                        [Dong2007 4.3, Eq. 5]
 // reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr: the integral of
 // the unit direction over the bin), surfels, node_radiosity [node_count] (W/m2), glossy_of_node, specular (W m^-2 sr^-1), light_bins (bits)
-// writes irradiance[element_count] (W/m2)   shared none.  Differs from [Dong2007]: see IS_PAPER.
+// writes irradiance[element_count] (W/m2)   shared none.  Differs from [Dong2007]: see TRANSPORT.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Receivers { Receiver receivers[]; };
@@ -22,14 +22,18 @@ layout(push_constant, scalar) uniform Params {
     uint first_leaf;
     uint leaf_count;    // of the window
     uint bin_count;
-    uint is_bounded;    // coverage: a sender fills no more of its bin than its own solid angle
-    uint table_side;    // of glossy nodes' tables; 0: all send evenly
 } params;
-// 1: the paper's Eq. 5, a point to a disc. 0: the sender covers its bin, so its weight is the bin's own form factor,
-// scaled so that all bins above the horizon together weigh pi.
-layout(constant_id = 0) const uint IS_PAPER = 0;
+// What a sender weighs. BY_BINS: it covers its bin, so its weight is the bin's own form factor, scaled so that all bins
+// above the horizon together weigh pi; BY_BOUNDED_BINS: but it fills no more of the bin than its own solid angle; BY_DISCS:
+// the paper's Eq. 5, a point to a disc.
+layout(constant_id = 0) const uint TRANSPORT = 0;
+const uint BY_BINS = 0;
+const uint BY_BOUNDED_BINS = 1;
+const uint BY_DISCS = 2;
 // 1: light links alone.
 layout(constant_id = 1) const uint OF_EMITTERS = 0;
+// Of glossy nodes' tables; 0: all send evenly.
+layout(constant_id = 2) const uint TABLE_SIDE = 0;
 
 const float PI = 3.14159265358979;
 
@@ -42,25 +46,25 @@ void main()
     vec3 sum = vec3(0.0);
     float total = 0.0;
     for (uint bin = 0; bin < params.bin_count; ++bin) {
-        float weight = dot(bin_vectors[bin], normal);
-        if (weight <= 0.0) continue;
+        float weight = max(dot(bin_vectors[bin], normal), 0.0);
         total += weight;
-        if (OF_EMITTERS != 0 && (light_bins[bin / 32 * params.leaf_count + local] >> bin % 32 & 1) == 0) continue;
         uint winner = winners[bin * params.leaf_count + local];
-        if (winner >= BACK_SEEN) continue;
-        if (IS_PAPER != 0 || params.is_bounded != 0) {
-            Surfel s = surfels[winner];
-            vec3 offset = s.centre - at.origin;
-            float squared = dot(offset, offset);
-            float solid_angle = s.area * max(dot(s.normal, -offset), 0.0) / (squared * sqrt(squared));
-            if (IS_PAPER != 0) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
-            else weight *= min(1.0, solid_angle / length(bin_vectors[bin]));
+        bool is_link = OF_EMITTERS == 0 || (light_bins[bin / 32 * params.leaf_count + local] >> bin % 32 & 1) != 0;
+        if (weight > 0.0 && winner < BACK_SEEN && is_link) {
+            vec3 sent = node_radiosity[winner];
+            if (TRANSPORT != BY_BINS) {
+                Surfel s = surfels[winner];
+                vec3 offset = s.centre - at.origin;
+                float squared = dot(offset, offset);
+                float solid_angle = s.area * max(dot(s.normal, -offset), 0.0) / (squared * sqrt(squared));
+                if (TRANSPORT == BY_DISCS) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
+                else weight *= min(1.0, solid_angle / length(bin_vectors[bin]));
+            }
+            if (TABLE_SIDE != 0 && glossy_of_node[winner] != EMPTY_BIN)
+                sent += PI * specular[glossy_of_node[winner] * 6 * TABLE_SIDE * TABLE_SIDE
+                                      + bin_of(at.origin - surfels[winner].centre, TABLE_SIDE)];
+            sum += weight * sent;
         }
-        vec3 sent = node_radiosity[winner];
-        if (params.table_side != 0 && glossy_of_node[winner] != EMPTY_BIN)
-            sent += PI * specular[glossy_of_node[winner] * 6 * params.table_side * params.table_side
-                                  + bin_of(at.origin - surfels[winner].centre, params.table_side)];
-        sum += weight * sent;
     }
-    irradiance[leaf_elements[params.first_leaf + local]] = sum / (IS_PAPER != 0 || total == 0.0 ? PI : total);
+    irradiance[leaf_elements[params.first_leaf + local]] = sum / (TRANSPORT == BY_DISCS ? PI : max(total, 1e-20));
 }

@@ -5,7 +5,7 @@
 #include "lib/quadtree.glsl"
 
 // One thread per leaf of a window and word of samples: which points on emitters it sees. The bins are an omnidirectional
-// shadow map: a point is hidden where it lies behind the plane of its bin's winner.                [Dong2007 3]
+// shadow map: a point is hidden where it lies behind the winners around its direction.             [Dong2007 3]
 // reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels[node_count], samples[sample_count],
 // triangles, positions   writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
 // Differs from [Dong2007]: every point is tested, so that an emitter smaller than a bin keeps its size and its shadow.
@@ -25,39 +25,39 @@ layout(push_constant, scalar) uniform Params {
     uint sample_count;
 } params;
 
-// Whether the winner stands between the receiver and the point.
-bool is_hidden_by(uint winner, vec3 origin, vec3 point)
+// Whether the winner's plane passes between the receiver and the point, and whether where it does is the winner itself.
+bvec2 hides(uint winner, vec3 origin, vec3 point)
 {
-    if (winner == EMPTY_BIN) return false;
+    if (winner == EMPTY_BIN) return bvec2(false);
     Surfel s = surfels[winner & NODE_MASK];
     float of_origin = dot(s.normal, origin - s.centre), of_point = dot(s.normal, point - s.centre);
     float slack = s.thickness + 0.02 * s.extent;
-    return of_origin > 0.0 ? of_point < -slack : of_point > slack;
+    if (!(of_origin > 0.0 ? of_point < -slack : of_point > slack)) return bvec2(false);
+    vec3 there = mix(origin, point, of_origin / (of_origin - of_point)) - s.centre;
+    float r = dot(s.g1, there), t = dot(s.g2, there);
+    return bvec2(true, r * r + t * t <= 1.0);
 }
 
-// Share of the four bins around the direction, by nearness, whose winners leave the point free: where only some do, the
-// edge of a shadow passes between them.
-float visible_share(uint local, Receiver at, vec3 offset, vec3 point)
+// A point is hidden by a winner of one of the four bins around its direction, or by the surface that lies before it in
+// all four. Where only some have it before the point, its edge passes between them, and there the winners are what is
+// known of it: their planes go on behind and below it.
+bool is_visible(uint local, Receiver at, vec3 point)
 {
-    vec3 direction = turn_back(at.frame, offset);
+    vec3 direction = turn_back(at.frame, point - at.origin);
     uint face = face_of(direction);
     vec3 in_axes = in_face(face, direction);
-    vec2 place = (0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5;
-    vec2 low = floor(place), f = place - low;
-    float share = 0.0;
+    vec2 low = floor((0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5);
+    bool by_all = true, by_one = false;
     for (uint corner = 0; corner < 4; ++corner) {
-        vec2 step_to = vec2(corner & 1, corner >> 1);
-        vec2 weights = mix(1.0 - f, f, step_to);
         // Beyond the face's rim the direction leads to a neighbouring face.
-        vec2 uv = (2.0 * (low + step_to) + 1.0) / float(params.n) - 1.0;
+        vec2 uv = (2.0 * (low + vec2(corner & 1, corner >> 1)) + 1.0) / float(params.n) - 1.0;
         uint bin = bin_of(face_direction(face, uv), params.n);
-        if (!is_hidden_by(winners[bin * params.leaf_count + local], at.origin, point)) share += weights.x * weights.y;
+        bvec2 hidden = hides(winners[bin * params.leaf_count + local], at.origin, point);
+        by_all = by_all && hidden.x;
+        by_one = by_one || hidden.y;
     }
-    return share;
+    return !by_all && !by_one;
 }
-
-// Thresholds of the samples fill 0..1 evenly, so that all of them together see as much of the emitter as is free.
-float threshold(uint k) { return fract(0.5 + 0.618033989 * float(k)); }
 
 void main()
 {
@@ -73,7 +73,7 @@ void main()
         EmitterPoint point = emitter_point(s, positions[v.x], positions[v.y], positions[v.z]);
         vec3 offset = point.position - at.origin;
         if (dot(offset, at.normal) <= 0.0 || emitter_cosine(s, point, -offset) <= 0.0) continue;
-        if (visible_share(local, at, offset, point.position) > threshold(word * 32 + k)) bits |= 1u << k;
+        if (is_visible(local, at, point.position)) bits |= 1u << k;
     }
     visible[leaf_elements[params.first_leaf + local] * words + word] = bits;
 }

@@ -359,6 +359,11 @@ impl ImplicitVisibility {
         recorder.dispatch(&pass, glossy_count);
     }
 
+    /// The specular lobe of each vertex.
+    pub fn lobes(&self) -> &Buffer<LeafGloss> {
+        &self.gloss.lobes
+    }
+
     /// What [`Self::look`] left, direct and indirect, W/m2 per element.
     pub fn shown_irradiance(&self) -> (&Buffer<Vec3>, &Buffer<Vec3>) {
         if self.gloss.is_empty() {

@@ -3,17 +3,24 @@
 use super::windows::{self, WindowPlan};
 use super::{Footprint, Settings, bins};
 use crate::gpu::shaders::methods::implicit_visibility as passes;
-use crate::gpu::shaders::types::{LinkCounts, Receiver, ReceiverGroup, WindowLevel};
+use crate::gpu::shaders::types::{GroupWalk, LinkCounts, Receiver, ReceiverGroup, WindowLevel};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::stages::quadtree::Quadtrees;
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use crate::stages::work::{Interrupted, Watch};
 use glam::Vec3;
+use std::ops::Range;
 
-/// Groups of receivers whose links are made in one submission, between which the user may interrupt.
-const GROUPS_AT_ONCE: u32 = 1 << 10;
+/// Groups of receivers whose links are made together, and submitted at once: between them the user may interrupt.
+const GROUPS_AT_ONCE: u32 = 1 << 11;
 /// Receivers of a group, at most, and threads of its workgroup.
 const GROUP: u32 = 16;
+/// Senders of each kind that a group holds before they are linked.
+const CAPACITY: u32 = 1 << 10;
+/// Kinds of senders, in the order of `lib/bins.glsl`: leaves, nodes about a plane, nodes without one.
+const KINDS: u32 = 3;
+/// Threads per node that push links down.
+const PUSHERS: usize = 16;
 
 /// Why the method cannot be prepared or its links cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -57,12 +64,19 @@ pub struct Linking {
     pub keys: Buffer<u64>,
     /// One entry.
     pub counts: Buffer<LinkCounts>,
+    /// Of the groups at work: where their walks are, and the senders that they hold, [`CAPACITY`] of each kind.
+    group_walks: Buffer<GroupWalk>,
+    held_senders: Buffer<u32>,
+    /// One entry; not zero where a walk has to go on.
+    unfinished: Buffer<u32>,
 }
 
 /// What will be allocated, counted before.
 pub(super) struct Sizes {
     pub windows: Vec<WindowPlan>,
     keys: usize,
+    /// Groups at work, at most.
+    groups: usize,
     bytes: u64,
 }
 
@@ -76,8 +90,11 @@ impl Sizes {
         let keys = rows as usize * bins as usize;
         let leaves = u64::from(trees.leaf_count());
         let receiver_bytes = leaves * size_of::<Receiver>() as u64;
-        let bytes = 8 * keys as u64 + 4 * (bins + bins.div_ceil(32)) * leaves + receiver_bytes;
-        Self { windows, keys, bytes }
+        let most_groups = windows.iter().map(|window| window.groups.iter().map(Vec::len).sum::<usize>()).max();
+        let groups = most_groups.unwrap_or(0).min(GROUPS_AT_ONCE as usize);
+        let held_bytes = groups as u64 * (u64::from(4 * KINDS * CAPACITY) + size_of::<GroupWalk>() as u64);
+        let bytes = 8 * keys as u64 + 4 * (bins + bins.div_ceil(32)) * leaves + receiver_bytes + held_bytes;
+        Self { windows, keys, groups, bytes }
     }
 
     /// Bytes that [`Linking::new`] allocates.
@@ -115,6 +132,9 @@ impl Linking {
             windows,
             keys: context.buffer("implicit/keys", sizes.keys)?,
             counts: context.buffer("implicit/link counts", 1)?,
+            group_walks: context.buffer("implicit/group walks", sizes.groups)?,
+            held_senders: context.buffer("implicit/held senders", sizes.groups * (KINDS * CAPACITY) as usize)?,
+            unfinished: context.buffer("implicit/unfinished walks", 1)?,
         })
     }
 
@@ -135,28 +155,29 @@ impl Linking {
             recorder.fill(&self.keys, u32::MAX);
             recorder.fill(&self.counts, 0);
             recorder.submit()?;
-            let mut first_of_level = 0;
-            for (level, groups) in window.plan.groups.iter().enumerate() {
-                let group_total = groups.len() as u32;
-                for first in (0..group_total).step_by(GROUPS_AT_ONCE as usize) {
+            let mut first_group = 0;
+            for groups in window.plan.groups.concat().chunks(GROUPS_AT_ONCE as usize) {
+                let group_count = groups.len() as u32;
+                let mut is_start = true;
+                // Walks with more senders than a group holds take several rounds.
+                while is_start || context.download(&self.unfinished)?[0] != 0 {
                     watch.step("links", done, rows)?;
-                    let group_count = (group_total - first).min(GROUPS_AT_ONCE);
-                    let first_group = first_of_level + first;
-                    let params = passes::CreateLinksParams {
-                        level: level as u32,
-                        first_group,
-                        group_count,
-                        ..link_params(trees, settings)
-                    };
                     let mut recorder = context.recorder("implicit-visibility")?;
                     recorder.scope("create links", |recorder| {
-                        recorder.dispatch(&self.create_links(trees, window, params), GROUP * group_count);
+                        self.create_links(
+                            recorder,
+                            trees,
+                            window,
+                            settings,
+                            first_group..first_group + group_count,
+                            is_start,
+                        );
                     });
                     recorder.submit()?;
-                    let made = &groups[first as usize..(first + group_count) as usize];
-                    done += made.iter().map(|group| u64::from(group.count)).sum::<u64>();
+                    is_start = false;
                 }
-                first_of_level += group_total;
+                done += groups.iter().map(|group| u64::from(group.count)).sum::<u64>();
+                first_group += group_count;
             }
             let mut recorder = context.recorder("implicit-visibility")?;
             recorder.scope("refine and push", |recorder| self.push_down(recorder, trees, settings, window));
@@ -169,24 +190,65 @@ impl Linking {
         Ok((visited, proposed))
     }
 
-    fn create_links<'a>(
-        &'a self,
-        trees: &'a Quadtrees,
-        window: &'a Window,
-        params: passes::CreateLinksParams,
-    ) -> passes::CreateLinks<'a> {
-        passes::CreateLinks {
-            walk: &trees.walk,
-            receiver_groups: &window.groups,
+    /// Collects senders for the groups as far as these can hold them, and links them.
+    fn create_links(
+        &self,
+        recorder: &mut Recorder<'_>,
+        trees: &Quadtrees,
+        window: &Window,
+        settings: &Settings,
+        groups: Range<u32>,
+        is_start: bool,
+    ) {
+        let (first_group, group_count) = (groups.start, groups.len() as u32);
+        let leaf_count = trees.topology.leaf_count();
+        recorder.fill(&self.unfinished, 0);
+        let pass = passes::CollectSenders {
+            walk_texels: &trees.walk_texels,
             surfels: &trees.surfels,
-            moments: &trees.moments,
-            receivers: &self.receivers,
-            leaf_cells: &trees.leaf_cells,
-            cell_corners: &trees.cell_corners,
-            window_levels: &window.levels,
-            keys: &self.keys,
+            receiver_groups: &window.groups,
+            group_walks: &self.group_walks,
+            held_senders: &self.held_senders,
             link_counts: &self.counts,
-            params,
+            unfinished: &self.unfinished,
+            params: passes::CollectSendersParams {
+                first_group,
+                group_count,
+                n: settings.bins,
+                refinement: if settings.brute_force { 0.0 } else { settings.refinement },
+                leaf_count,
+                walk_count: trees.topology.node_count(),
+                capacity: CAPACITY,
+                is_start: u32::from(is_start),
+            },
+        };
+        recorder.dispatch(&pass, group_count);
+        for kind in 0..KINDS {
+            let pass = passes::CreateLinks {
+                receiver_groups: &window.groups,
+                surfels: &trees.surfels,
+                moments: &trees.moments,
+                receivers: &self.receivers,
+                leaf_cells: &trees.leaf_cells,
+                cell_corners: &trees.cell_corners,
+                group_walks: &self.group_walks,
+                held_senders: &self.held_senders,
+                keys: &self.keys,
+                link_counts: &self.counts,
+                constants: passes::CreateLinksConstants {
+                    kind,
+                    is_single: u32::from(settings.footprint() == Footprint::Single),
+                    is_turned: u32::from(settings.is_turned()),
+                },
+                params: passes::CreateLinksParams {
+                    first_group,
+                    group_count,
+                    n: settings.bins,
+                    leaf_count,
+                    capacity: CAPACITY,
+                },
+            };
+            recorder.dispatch(&pass, GROUP * group_count);
         }
     }
 
@@ -200,7 +262,7 @@ impl Linking {
                 keys: &self.keys,
                 params: passes::PushDownParams { level: level as u32, bin_count },
             };
-            recorder.dispatch(&pass, window.plan.levels[level].count as usize * bin_count as usize);
+            recorder.dispatch(&pass, window.plan.levels[level].count as usize * PUSHERS);
         }
         let pass = passes::Resolve {
             node_segments: &trees.node_segments,
@@ -209,13 +271,22 @@ impl Linking {
             receivers: &self.receivers,
             keys: &self.keys,
             winners: &window.winners,
-            params: passes::ResolveParams {
-                n: settings.bins,
-                fills_holes: u32::from(settings.fill_holes),
-                is_turned: u32::from(settings.is_turned()),
-            },
+            params: passes::ResolveParams { n: settings.bins, is_turned: u32::from(settings.is_turned()) },
         };
-        recorder.dispatch(&pass, window.plan.leaves().len() * 6 * settings.bins as usize);
+        let rows = window.plan.leaves().len() * 6 * settings.bins as usize;
+        recorder.dispatch(&pass, rows);
+        if settings.fill_holes {
+            let pass = passes::FillHoles {
+                node_segments: &trees.node_segments,
+                segments: &trees.segments,
+                window_levels: &window.levels,
+                receivers: &self.receivers,
+                keys: &self.keys,
+                winners: &window.winners,
+                params: passes::FillHolesParams { n: settings.bins, is_turned: u32::from(settings.is_turned()) },
+            };
+            recorder.dispatch(&pass, rows);
+        }
     }
 
     /// The winners of one leaf's bins, for views and tests.
@@ -228,20 +299,5 @@ impl Linking {
             }
         }
         Ok(Vec::new())
-    }
-}
-
-/// What all dispatches of a frame have in common.
-fn link_params(trees: &Quadtrees, settings: &Settings) -> passes::CreateLinksParams {
-    passes::CreateLinksParams {
-        level: 0,
-        first_group: 0,
-        group_count: 0,
-        n: settings.bins,
-        refinement: if settings.brute_force { 0.0 } else { settings.refinement },
-        is_single: u32::from(settings.footprint() == Footprint::Single),
-        leaf_count: trees.topology.leaf_count(),
-        walk_count: trees.topology.node_count(),
-        is_turned: u32::from(settings.is_turned()),
     }
 }

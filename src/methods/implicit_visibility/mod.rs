@@ -18,8 +18,8 @@
 //! **Per frame with new links** ([`ImplicitVisibility::link`]): anything that moves or deforms. **Without:** lights,
 //! materials, the environment.
 //!
-//! Differs from [Dong2007]: each receiver finds its links by a walk over the trees, which a queue of pairs would only
-//! scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
+//! Differs from [Dong2007]: neighbouring receivers find their senders by one walk over the trees, which a queue of pairs
+//! would only scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
 //! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
 //! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
 //! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays; glossy elements send
@@ -364,15 +364,14 @@ impl ImplicitVisibility {
                 irradiance: &s.irradiance,
                 light_bins: &window.light_bins,
                 constants: passes::GatherConstants {
-                    is_paper: u32::from(self.settings.transport == Transport::Disc),
+                    transport: self.settings.transport_kind(),
                     of_emitters: u32::from(sent == Sent::Emitted),
+                    table_side: if sent == Sent::Reflected && !self.gloss.is_empty() { self.gloss.side } else { 0 },
                 },
                 params: passes::GatherParams {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
                     bin_count: self.settings.bin_count(),
-                    is_bounded: u32::from(self.settings.footprint() == Footprint::Single),
-                    table_side: if sent == Sent::Reflected && !self.gloss.is_empty() { self.gloss.side } else { 0 },
                 },
             };
             recorder.dispatch(&pass, leaves.len());

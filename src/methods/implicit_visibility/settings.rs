@@ -90,6 +90,15 @@ impl Settings {
         self.frames != Frames::World || self.spin != 0.0
     }
 
+    /// What a sender weighs, as `gather.comp` numbers it.
+    pub(super) fn transport_kind(&self) -> u32 {
+        match (self.transport, self.footprint) {
+            (Transport::Coverage, Footprint::Covered) => 0,
+            (Transport::Coverage, Footprint::Single) => 1,
+            (Transport::Disc, _) => 2,
+        }
+    }
+
     pub(super) fn footprint(&self) -> Footprint {
         if self.transport == Transport::Disc { Footprint::Single } else { self.footprint }
     }

@@ -121,6 +121,7 @@ fn groups(trees: &QuadtreeTopology, levels: &[WindowLevel], level: usize) -> Vec
             above_first: parent.unwrap_or(0),
             above_count: u32::from(parent.is_some()),
             above_node: parent.map_or(0, |parent| up(parent, 2)),
+            row: levels[level].row + node - first,
         });
     }
     // The parents of a group are in one group, as a whole.
@@ -156,7 +157,7 @@ mod tests {
                 let mut held: Vec<u32> = window.levels.iter().flat_map(|l| l.first..l.first + l.count).collect();
                 held.sort_unstable();
                 assert_eq!(nodes, held);
-                // Groups hold the same nodes, each below its group's, and their parents' groups are groups.
+                // Groups hold the same nodes, each below its group's, in their rows, and their parents' groups are groups.
                 let members = |group: &ReceiverGroup| group.first..group.first + group.count;
                 assert!(window.groups.iter().flatten().all(|group| group.count <= 16));
                 let mut grouped: Vec<u32> = window.groups.iter().flatten().flat_map(members).collect();
@@ -165,6 +166,8 @@ mod tests {
                 for (level, group) in window.groups.iter().enumerate().flat_map(|(l, g)| g.iter().map(move |g| (l, g)))
                 {
                     let leaves = trees.leaves(group.node);
+                    let own = &window.levels[level];
+                    assert_eq!(group.row - own.row, group.first - own.first);
                     assert!(members(group).all(|node| leaves.contains(&trees.leaves(node).start)));
                     let above = (group.above_first, group.above_count, group.above_node);
                     let is_group = |other: &ReceiverGroup| (other.first, other.count, other.node) == above;

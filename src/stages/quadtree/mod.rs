@@ -11,7 +11,7 @@ use super::elements::Elements;
 use super::world::World;
 use crate::gpu::shaders::quadtree as passes;
 use crate::gpu::shaders::types::{CellCorner, LeafCell, QuadtreeSegment, Surfel, SurfelMoments, WalkStep};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use glam::Vec3;
 use topology::QuadtreeTopology;
 
@@ -30,8 +30,13 @@ pub struct Quadtrees {
     /// One per entry of the elements' incident triangles.
     pub cell_corners: Buffer<CellCorner>,
     /// One per node.
-    pub walk: Buffer<WalkStep>,
+    walk: Buffer<WalkStep>,
+    /// The same with what a walk looks at, [`WALK_TEXELS`] per node.
+    pub walk_texels: TexelBuffer,
 }
+
+/// Texels of a step of the walk; the layout is that of `lib/quadtree.glsl`.
+const WALK_TEXELS: usize = 3;
 
 impl Quadtrees {
     /// Uploads the topology; [`Self::pull_surfels`] places the nodes.
@@ -47,13 +52,15 @@ impl Quadtrees {
             leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
             cell_corners: context.buffer("quadtree/cell corners", corner_count)?,
             walk: context.upload("quadtree/walk", &topology.walk())?,
+            walk_texels: context.texel_buffer("quadtree/walk texels", (WALK_TEXELS * count).max(1))?,
             topology,
         })
     }
 
     /// Bytes of the tables of [`Self::new`].
     pub fn bytes_needed(topology: &QuadtreeTopology, corner_count: usize) -> u64 {
-        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + size_of::<WalkStep>() + size_of::<u32>();
+        let walk = size_of::<WalkStep>() + WALK_TEXELS * 16;
+        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + walk + size_of::<u32>();
         u64::from(topology.node_count()) * node as u64
             + u64::from(topology.leaf_count()) * (size_of::<LeafCell>() + size_of::<u32>()) as u64
             + (corner_count * size_of::<CellCorner>()) as u64
@@ -89,6 +96,14 @@ impl Quadtrees {
             };
             recorder.dispatch(&pass, level.len());
         }
+        let node_count = self.topology.node_count();
+        let pass = passes::PackWalk {
+            walk: &self.walk,
+            surfels: &self.surfels,
+            walk_texels: self.walk_texels.buffer(),
+            params: passes::PackWalkParams { node_count },
+        };
+        recorder.dispatch(&pass, node_count);
     }
 
     /// Radiosity of all nodes from that of the elements, W/m2.                                     [Dong2007 4.3]

@@ -1,0 +1,105 @@
+#version 460
+#include "lib/prelude.glsl"
+#include "lib/bins.glsl"
+#include "lib/hemisphere.glsl"
+#include "lib/quadtree.glsl"
+#include "methods/implicit_visibility/horizon.glsl"
+
+// One thread per group of receiving nodes: walks all trees, down to where a sender fits into a bin of all of the group's
+// nodes, and holds those senders, by kind, for linking. Where a list is full it stops, to go on from there the next time.
+//                                                                                                  [Dong2007 4.2.2]
+// reads receiver_groups, walk_texels[WALK_TEXELS * node_count], surfels[node_count]
+// updates group_walks[group_count], link_counts, unfinished[1] (1: a walk stopped)
+// writes held_senders[3 * capacity * group_count]   shared none
+// Differs from [Dong2007]: pairs are directed, and a pair is not queued but found by its receiver's walk.
+layout(local_size_x = 16) in;
+layout(set = 0, binding = 0) uniform usamplerBuffer walk_texels;
+layout(set = 0, binding = 1, scalar) readonly buffer Surfels { Surfel surfels[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Groups { ReceiverGroup receiver_groups[]; };
+layout(set = 0, binding = 3, scalar) buffer Walks { GroupWalk group_walks[]; };
+layout(set = 0, binding = 4, scalar) writeonly buffer Held { uint held_senders[]; };
+layout(set = 0, binding = 5, scalar) buffer Counts { LinkCounts link_counts[]; };
+layout(set = 0, binding = 6, scalar) buffer Unfinished { uint unfinished[]; };
+layout(push_constant, scalar) uniform Params {
+    uint first_group;
+    uint group_count;
+    uint n;                 // bins a side of a face
+    float refinement;       // of a bin's solid angle, what a node may fill; 0 refines down to leaves
+    uint leaf_count;
+    uint walk_count;
+    uint capacity;          // senders of each kind that a group may hold
+    uint is_start;          // 1: walks start here
+} params;
+
+// Whether a disc of that extent, seen from `distance_there`, fills no more than its share of the bin that `towards` points
+// into: a bin's solid angle is 4 / n^2 times the cube of the largest component of its unit direction.
+bool fits(float extent, vec3 towards, float distance_there)
+{
+    vec3 size = abs(towards) / length(towards);
+    float largest = max(size.x, max(size.y, size.z));
+    return distance_there > 0.0
+           && PI * extent * extent * float(params.n * params.n)
+                  < 4.0 * params.refinement * largest * largest * largest * distance_there * distance_there;
+}
+
+float widest(uint first, uint count)
+{
+    float extent = 0.0;
+    for (uint k = first; k < first + count; ++k) extent = max(extent, surfels[k].extent);
+    return extent;
+}
+
+void main()
+{
+    uint slot = linear_index();
+    if (slot >= params.group_count) return;
+    ReceiverGroup group = receiver_groups[params.first_group + slot];
+    bool has_above = group.above_count > 0, of_leaves = group.first < params.leaf_count;
+    Surfel own = surfels[group.node], above = surfels[has_above ? group.above_node : group.node];
+    Extents receiver = Extents(own.normal, own.cos_cone, own.radius, own.thickness);
+    float extent = widest(group.first, group.count), extent_above = widest(group.above_first, group.above_count);
+
+    GroupWalk at = group_walks[slot];
+    // Where the walk of the group above did not go further down, and left what is below to its children.
+    if (params.is_start != 0) at = GroupWalk(0, has_above ? 0 : params.walk_count, uvec3(0));
+    at.held = uvec3(0);
+    uint first = 3 * params.capacity * slot, visited = 0;
+    // Without branches but the last: where threads run in lockstep, each is taken by some.
+    while (at.step < params.walk_count && max(at.held.x, max(at.held.y, at.held.z)) < params.capacity) {
+        vec4 place = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step)));
+        vec4 facing = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step + 1)));
+        uvec4 rest = texelFetch(walk_texels, int(WALK_TEXELS * at.step + 2));
+        uint sender = rest.x, skip = rest.y;
+        float radius = place.w, sender_extent = facing.w, thickness = uintBitsToFloat(rest.z);
+        bool is_leaf = sender < params.leaf_count;
+        ++visited;
+
+        vec3 offset = place.xyz - own.centre;
+        bool is_dropped = is_below_horizon(receiver, Extents(facing.xyz, 0.0, radius, thickness), offset);
+
+        vec3 from_above = place.xyz - above.centre;
+        float nearest_above = length(from_above) - above.radius;
+        bool ends_above = !is_dropped && at.step >= at.left_from_above
+                          && (is_leaf || fits(sender_extent, from_above, nearest_above));
+        at.left_from_above = ends_above ? skip : at.left_from_above;
+        is_dropped = is_dropped || (ends_above && fits(extent_above, from_above, nearest_above));  // that link comes down
+
+        float nearest = length(offset) - own.radius;
+        bool is_refined = !is_leaf && !fits(sender_extent, offset, nearest);
+        float farthest = nearest + radius;
+        bool may_fit = is_refined ? PI * extent * extent * float(params.n * params.n) < 4.0 * params.refinement * farthest * farthest
+                                  : fits(extent, offset, nearest);
+        is_dropped = is_dropped || (!of_leaves && !may_fit);    // left to the children
+
+        if (!is_dropped && !is_refined) {
+            uint kind = is_leaf ? OF_LEAVES : uintBitsToFloat(rest.w) < 0.5 ? OF_OUTLINES : OF_PLANES;
+            uint place_in_list = kind == OF_LEAVES ? at.held.x : kind == OF_PLANES ? at.held.y : at.held.z;
+            held_senders[first + kind * params.capacity + place_in_list] = sender;
+            at.held += uvec3(equal(uvec3(OF_LEAVES, OF_PLANES, OF_OUTLINES), uvec3(kind)));
+        }
+        at.step = is_refined && !is_dropped ? at.step + 1 : skip;
+    }
+    group_walks[slot] = at;
+    if (at.step < params.walk_count) atomicOr(unfinished[0], 1);
+    atomicAdd(link_counts[0].visited, visited * group.count);
+}
