@@ -12,7 +12,7 @@ use super::console::Verbosity;
 use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
-    parse_method, parse_method_or_auto, parse_pixel, parse_place, parse_size, parse_timeout, parse_turn,
+    parse_memory, parse_method, parse_method_or_auto, parse_pixel, parse_place, parse_size, parse_timeout, parse_turn,
 };
 use crate::gpu::LossPoint;
 use crate::methods::Method;
@@ -33,7 +33,7 @@ pub struct Cli {
 const EXIT_CODES: &str = "Exit codes: 0 done, 1 the work failed, 2 wrong usage, 3 no usable GPU.";
 
 /// Options of every command.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct Global {
     /// GPU to use: part of its name, or its index in `linklight devices`
     #[arg(long, global = true, value_name = "NAME|INDEX")]
@@ -51,6 +51,10 @@ pub struct Global {
     /// what is told of it
     #[arg(long, global = true, value_name = "PASS[@N]")]
     pub lose_device_at: Option<LossPoint>,
+    /// Most memory that a scene and what is made of it may take, such as 512M or 12G, on the host and again on the GPU;
+    /// what needs more is refused before it is allocated [default: 8G on the host, all there is on the GPU]
+    #[arg(long, global = true, value_name = "SIZE", value_parser = parse_memory)]
+    pub max_memory: Option<u64>,
     /// Say nothing but errors
     #[arg(long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,

@@ -427,6 +427,7 @@ pub(super) fn device_options(global: &Global) -> Options {
         gpu: global.gpu.clone(),
         validation: global.validate,
         pipeline_cache: pipeline_cache(),
+        max_memory_bytes: global.max_memory,
         timeout: global.gpu_timeout,
         lose_device_at: global.lose_device_at.clone(),
         ..Options::default()

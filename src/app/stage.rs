@@ -20,8 +20,8 @@ use crate::stages::bvh::Bvh;
 use crate::stages::trace::Tracer;
 use crate::stages::world::World;
 
-/// Host memory that a scene and what is computed from it may take, bytes.
-const MAX_MEMORY_BYTES: u64 = 8 << 30;
+/// Host memory that a scene and what is computed from it may take where nothing else is said, bytes.
+const DEFAULT_MEMORY_BYTES: u64 = 8 << 30;
 /// Elements that methods solving on elements aim at where nothing else is asked for.
 const DEFAULT_ELEMENTS: u32 = 20_000;
 /// Of those, at most as long, as a share of the scene's diagonal: half a step of a stair in a house.
@@ -50,7 +50,7 @@ pub struct Stage {
 impl Stage {
     /// Loads and places what `request` asks for. What was skipped or repaired on the way is logged.
     pub fn new(context: &Context, request: &RenderRequest, time_line: &TimeLine) -> Result<Self, AppError> {
-        let scene = time_line.span("load scene", || load_scene(&request.scene))?;
+        let scene = time_line.span("load scene", || load_scene(&request.scene, context))?;
         let mut scene = scene;
         request.edits.iter().try_for_each(|edit| edits::apply(&mut scene, edit))?;
         Self::place(context, scene, request, time_line)
@@ -100,7 +100,8 @@ impl Stage {
         let environment = time_line
             .span("load environment", || {
                 let turn = request.environment_turn.to_radians();
-                environment::load(environment, turn, &EnvironmentLimits::default())
+                let max_memory_bytes = host_bytes(context).saturating_sub(scene.size_bytes());
+                environment::load(environment, turn, &EnvironmentLimits { max_memory_bytes, ..Default::default() })
             })
             .map_err(AppError::failed)?;
         let notes = scene
@@ -111,7 +112,10 @@ impl Stage {
             .chain(animation::unplayed_channels(&scene));
         notes.for_each(|note| tracing::info!("{note}"));
 
-        let (geometry, rest_positions) = time_line.span("tessellate", || flatten(&scene, request))?;
+        let (geometry, rest_positions) = time_line.span("tessellate", || {
+            let held = scene.size_bytes().saturating_add(environment.environment.size_bytes());
+            flatten(&scene, request, host_bytes(context).saturating_sub(held))
+        })?;
         if geometry.triangle_count() == 0 {
             return Err(AppError::failed(format!("the scene {:?} has no triangles to render", scene.name)));
         }
@@ -196,8 +200,14 @@ fn build_acceleration(context: &Context, rays: Rays, world: &World) -> Result<Op
     Ok(Some(structure))
 }
 
-pub fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
-    let options = LoadOptions { max_memory_bytes: MAX_MEMORY_BYTES, ..LoadOptions::default() };
+/// Host memory that a scene and what is computed from it may take, bytes.
+fn host_bytes(context: &Context) -> u64 {
+    context.max_memory_bytes().unwrap_or(DEFAULT_MEMORY_BYTES)
+}
+
+/// Loads what `source` names, within the memory that `context` was given.
+pub fn load_scene(source: &SceneSource, context: &Context) -> Result<Scene, AppError> {
+    let options = LoadOptions { max_memory_bytes: host_bytes(context), ..LoadOptions::default() };
     match source {
         SceneSource::File(path) => crate::scene::load(path, &options).map_err(AppError::failed),
         SceneSource::Builtin(name) => {
@@ -208,8 +218,8 @@ pub fn load_scene(source: &SceneSource) -> Result<Scene, AppError> {
 
 /// The scene as one list of triangles, cut as fine as the request asks, and its vertices' places at rest. A method
 /// with elements needs some by default, also on the large surfaces of a scene that has many small ones.
-fn flatten(scene: &Scene, request: &RenderRequest) -> Result<(Geometry, Vec<Vec3>), AppError> {
-    let geometry = Geometry::flatten(scene, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
+fn flatten(scene: &Scene, request: &RenderRequest, max_bytes: u64) -> Result<(Geometry, Vec<Vec3>), AppError> {
+    let geometry = Geometry::flatten(scene, max_bytes).map_err(AppError::failed)?;
     let rest = Pose::rest(scene);
     let fineness = match request.elements {
         Some(target) => Fineness::Elements(target),
@@ -222,6 +232,6 @@ fn flatten(scene: &Scene, request: &RenderRequest) -> Result<(Geometry, Vec<Vec3
             return Ok((geometry, positions));
         }
     };
-    let cut = tessellate(geometry, &rest, fineness, MAX_MEMORY_BYTES).map_err(AppError::failed)?;
+    let cut = tessellate(geometry, &rest, fineness, max_bytes).map_err(AppError::failed)?;
     Ok((cut.geometry, cut.rest_positions))
 }

@@ -16,6 +16,7 @@ use glam::Vec3;
 
 use super::AppError;
 use super::cli::PictureArgs;
+use crate::files;
 use crate::report::write::write_text;
 use crate::scene::environment::load::EnvironmentSource;
 
@@ -68,11 +69,11 @@ fn is_overridden(name: &str, given: &[String]) -> bool {
 
 fn read(path: &Path) -> Result<Vec<OsString>, AppError> {
     let refuse = |reason: String| AppError::Usage(format!("cannot take the state {}: {reason}", path.display()));
-    let bytes = std::fs::metadata(path).map_err(|error| refuse(error.to_string()))?.len();
+    let bytes = files::metadata(path).map_err(|error| refuse(error.to_string()))?.len();
     if bytes > MAX_BYTES {
         return Err(refuse(format!("{bytes} bytes long, at most {MAX_BYTES} are read; is it another file?")));
     }
-    let text = std::fs::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
+    let text = files::read_to_string(path).map_err(|error| refuse(error.to_string()))?;
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     Ok(lines.map(OsString::from).collect())
 }

@@ -8,6 +8,7 @@ use std::time::Duration;
 use glam::{UVec2, Vec3};
 use serde_json::Value;
 
+use crate::files;
 use crate::methods::settings::suggest;
 use crate::methods::{self, METHODS, Method};
 use crate::report::image::{MAX_PIXELS, MAX_SIDE};
@@ -33,7 +34,7 @@ impl SceneSource {
             }
             Self::File(path) => {
                 for file in scene_files(path) {
-                    hasher.update(&std::fs::read(&file).unwrap_or_default());
+                    hasher.update(&files::read(&file).unwrap_or_default());
                 }
             }
         }
@@ -44,7 +45,7 @@ impl SceneSource {
 /// The file and, for JSON, the files beside it that it names.
 fn scene_files(path: &Path) -> Vec<PathBuf> {
     let mut files = vec![path.to_owned()];
-    let text = std::fs::read(path).unwrap_or_default();
+    let text = files::read(path).unwrap_or_default();
     let Ok(document) = serde_json::from_slice::<Value>(&text) else { return files };
     for list in ["buffers", "images"] {
         let uris = document[list].as_array().into_iter().flatten().filter_map(|entry| entry["uri"].as_str());
@@ -177,6 +178,20 @@ pub fn parse_place(text: &str) -> Result<Vec3, String> {
     }
 }
 
+/// `--max-memory`: bytes, or so many K, M, G or T of 1024.
+pub fn parse_memory(text: &str) -> Result<u64, String> {
+    let form = || "expected bytes, or a whole number with K, M, G or T, such as 512M; at least 1M".to_owned();
+    let (number, shift) = match text.char_indices().next_back() {
+        Some((at, unit)) if unit.is_ascii_alphabetic() => {
+            let place = "KMGT".find(unit.to_ascii_uppercase()).ok_or_else(form)?;
+            (&text[..at], 10 * (place as u32 + 1))
+        }
+        _ => (text, 0),
+    };
+    let number: u64 = number.parse().map_err(|_| form())?;
+    number.checked_mul(1 << shift).filter(|bytes| *bytes >= 1 << 20).ok_or_else(form)
+}
+
 /// `--fov`.
 pub fn parse_field_of_view(text: &str) -> Result<f32, String> {
     number_within(text, 1.0, 170.0, "degrees")
@@ -270,6 +285,15 @@ mod tests {
             assert!(parse_size(bad).is_err(), "{bad:?}");
         }
         assert!(parse_size("16384x16384").unwrap_err().contains("at most"));
+    }
+
+    #[test]
+    fn memory_sizes() {
+        let sizes = ["1048576", "512M", "12g", "2048K", "1T"].map(|text| parse_memory(text).unwrap());
+        assert_eq!(sizes, [1 << 20, 512 << 20, 12 << 30, 2 << 20, 1 << 40]);
+        for bad in ["", "M", "-1M", "1.5G", "12P", "1023K", "0", "99999999999G", "1GB", "\u{e9}"] {
+            assert!(parse_memory(bad).is_err(), "{bad:?}");
+        }
     }
 
     #[test]

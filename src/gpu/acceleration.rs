@@ -96,6 +96,9 @@ impl Context {
     ) -> Result<Option<AccelerationStructure>, GpuError> {
         let device = &self.device;
         let Some(extension) = &device.acceleration_structure else { return Ok(None) };
+        if !device.owns(positions.id()) || !device.owns(indices.id()) {
+            return Err(GpuError::Refused(format!("{name}: its triangles are of another device")));
+        }
         let (vertex_count, triangle_count) = (positions.len() as u32, indices.len() as u32);
         let address_usage = vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
         let instance = RawBuffer::new(
@@ -175,6 +178,18 @@ impl Recorder<'_> {
     ) {
         let device = self.context().device.clone();
         let Some(extension) = &device.acceleration_structure else { return };
+        let (vertices, triangle_count) = (structure.vertex_count as usize, structure.triangle_count as usize);
+        if positions.len() < vertices || indices.len() < triangle_count {
+            let message = format!(
+                "acceleration structure of {vertices} vertices and {triangle_count} triangles, built from {} and {}",
+                positions.len(),
+                indices.len()
+            );
+            return self.fail(GpuError::Refused(message));
+        }
+        if ![positions.id(), indices.id(), structure.id].into_iter().all(|id| device.owns(id)) {
+            return self.fail(GpuError::Refused("acceleration structure: built from objects of another device".into()));
+        }
         let scratch_address = address(&device, structure.scratch.raw).next_multiple_of(256);
         let levels = [
             (

@@ -17,7 +17,7 @@ pub struct Buffer<T> {
 
 impl<T> Buffer<T> {
     pub(super) fn new(device: &Arc<Device>, name: &str, len: usize) -> Result<Self, GpuError> {
-        let bytes = len as u64 * size_of::<T>() as u64;
+        let bytes = (len as u64).saturating_mul(size_of::<T>() as u64);
         let allowed = device.limits.storage_buffer_bytes;
         if bytes > allowed {
             return Err(GpuError::StorageRange { name: name.to_owned(), bytes, allowed });

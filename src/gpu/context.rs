@@ -26,10 +26,16 @@ pub struct Options {
     pub gpu: Option<String>,
     /// Run core and synchronization validation; messages are collected.
     pub validation: bool,
+    /// With `validation`, also look at what shaders do: accesses beyond the end of buffers, which are errors then. Slow.
+    pub gpu_assisted: bool,
+    /// With `validation`, also say what may be slow or unwise.
+    pub best_practices: bool,
     /// A full barrier before every pass. If a picture changes by it, a hazard was missed.
     pub full_barriers: bool,
     /// Leave every barrier out. Only to show that validation sees it.
     pub skip_barriers: bool,
+    /// Leave new images in the layout they are born in. Only to show that validation sees it.
+    pub skip_layouts: bool,
     /// Hash what every compute pass writes; see [`Context::take_hashes`].
     pub hash_passes: bool,
     /// Count invocations and primitives per pass where the device can.
@@ -38,6 +44,9 @@ pub struct Options {
     pub no_optional_features: bool,
     /// Pretend that this is the largest buffer a pass can bind, bytes.
     pub max_storage_buffer_bytes: Option<u64>,
+    /// Most device memory that all objects together may take, bytes; all that the device has where empty. What is made
+    /// for the device on the host keeps to it too.
+    pub max_memory_bytes: Option<u64>,
     /// Where the driver's pipeline cache is kept; nowhere where empty.
     pub pipeline_cache: Option<PathBuf>,
     /// Ready to show images in windows; see [`super::Presenter`].
@@ -76,14 +85,15 @@ pub struct Context {
 impl Context {
     /// Opens the wanted (or best) device. Fails by name of what is missing.
     pub fn new(options: Options) -> Result<Self, GpuError> {
-        let instance = Arc::new(Instance::new(options.validation, options.presents)?);
-        let candidate = selection::choose(selection::candidates(&instance), options.gpu.as_deref())?;
+        let instance = Arc::new(Instance::new(&options)?);
+        let candidate = selection::choose(selection::candidates(&instance)?, options.gpu.as_deref())?;
         let enabled =
             if options.no_optional_features { OptionalFeatures::default() } else { candidate.support.optional };
-        let mut device = Device::new(instance, candidate, enabled)?;
+        let mut device = Device::new(instance, candidate, enabled, !options.gpu_assisted)?;
         if let Some(bytes) = options.max_storage_buffer_bytes {
             device.limits.storage_buffer_bytes = device.limits.storage_buffer_bytes.min(bytes);
         }
+        device.max_memory_bytes = options.max_memory_bytes.unwrap_or(u64::MAX);
         let device = Arc::new(device);
         tracing::debug!("device {} {} ({})", device.info.index, device.info.name, device.info.driver);
         let pipelines = Pipelines::new(&device, options.pipeline_cache.clone())?;
@@ -142,6 +152,9 @@ impl Context {
 
     pub fn image(&self, description: &ImageDescription<'_>) -> Result<Image, GpuError> {
         let image = Image::new(&self.device, description)?;
+        if self.options.skip_layouts {
+            return Ok(image);
+        }
         let mut recorder = self.recorder("new image")?;
         recorder.initialize_image(&image);
         recorder.submit()?;
@@ -187,6 +200,11 @@ impl Context {
         self.device.is_lost.load(Ordering::Acquire)
     }
 
+    /// What [`Options::max_memory_bytes`] said.
+    pub fn max_memory_bytes(&self) -> Option<u64> {
+        self.options.max_memory_bytes
+    }
+
     /// Device memory that may still be allocated, bytes.
     pub fn available_bytes(&self) -> u64 {
         self.device.available_bytes()
@@ -218,7 +236,22 @@ impl Context {
             Err(vk::Result::TIMEOUT) => {
                 Err(GpuError::Timeout { last_pass: last_pass.to_owned(), seconds: patience.as_secs_f64() })
             }
-            Err(error) => Err(GpuError::from_call("vkWaitSemaphores", error, last_pass)),
+            Err(vk::Result::ERROR_DEVICE_LOST) => {
+                Err(GpuError::from_call("vkWaitSemaphores", vk::Result::ERROR_DEVICE_LOST, last_pass))
+            }
+            Err(error) => {
+                // The work may still be running: until it ends, nothing that it uses may be freed or used again.
+                // SAFETY: the device is alive; the queue is ours alone while its lock is held.
+                let idle = {
+                    let _queue = lock(&self.queue_lock);
+                    unsafe { self.device.raw.device_wait_idle() }
+                };
+                match idle {
+                    Ok(()) => drop(self.device.completed.fetch_max(value, Ordering::AcqRel)),
+                    Err(_) => self.device.is_lost.store(true, Ordering::Release),
+                }
+                Err(GpuError::from_call("vkWaitSemaphores", error, last_pass))
+            }
         }
     }
 
@@ -238,11 +271,15 @@ impl Context {
     /// A command slot with reset command pool and queries.
     pub(super) fn take_slot(&self) -> Result<CommandSlot, GpuError> {
         let raw = &self.device.raw;
-        if let Some(slot) = lock(&self.slots).pop() {
+        // Apart from the condition, whose temporary would hold the lock.
+        let kept = lock(&self.slots).pop();
+        if let Some(slot) = kept {
             // SAFETY: slots are given back only when their submission is complete.
             unsafe {
-                raw.reset_command_pool(slot.pool, vk::CommandPoolResetFlags::empty())
-                    .checked("vkResetCommandPool", "start")?;
+                if let Err(error) = raw.reset_command_pool(slot.pool, vk::CommandPoolResetFlags::empty()) {
+                    self.give_slot(slot);
+                    return Err(GpuError::from_call("vkResetCommandPool", error, "start"));
+                }
                 for &pool in &slot.timestamps {
                     raw.reset_query_pool(pool, 0, 2 * PASSES_PER_POOL);
                 }
@@ -263,8 +300,13 @@ impl Context {
                 .command_pool(pool)
                 .level(vk::CommandBufferLevel::PRIMARY)
                 .command_buffer_count(1);
-            let commands = raw.allocate_command_buffers(&info).checked("vkAllocateCommandBuffers", "start")?[0];
-            Ok(CommandSlot { pool, commands, timestamps: Vec::new(), statistics: Vec::new() })
+            match raw.allocate_command_buffers(&info).checked("vkAllocateCommandBuffers", "start") {
+                Ok(made) => Ok(CommandSlot { pool, commands: made[0], timestamps: Vec::new(), statistics: Vec::new() }),
+                Err(error) => {
+                    raw.destroy_command_pool(pool, None);
+                    Err(error)
+                }
+            }
         }
     }
 
@@ -275,13 +317,11 @@ impl Context {
             let info = vk::QueryPoolCreateInfo::default()
                 .query_type(vk::QueryType::TIMESTAMP)
                 .query_count(2 * PASSES_PER_POOL);
-            // SAFETY: complete create infos; fresh pools are reset before use.
+            // SAFETY: complete create infos; fresh pools are reset before use. Statistics go first: the length of
+            // `timestamps` says how far both have come.
             unsafe {
-                let queries = raw.create_query_pool(&info, None).checked("vkCreateQueryPool", "timestamps")?;
-                self.device.set_name(queries, "timestamps");
-                raw.reset_query_pool(queries, 0, 2 * PASSES_PER_POOL);
-                slot.timestamps.push(queries);
-                if self.options.statistics && self.device.optional.pipeline_statistics {
+                let counts = self.options.statistics && self.device.optional.pipeline_statistics;
+                if counts && slot.statistics.len() <= slot.timestamps.len() {
                     let info = vk::QueryPoolCreateInfo::default()
                         .query_type(vk::QueryType::PIPELINE_STATISTICS)
                         .pipeline_statistics(STATISTIC_FLAGS)
@@ -291,6 +331,10 @@ impl Context {
                     raw.reset_query_pool(queries, 0, PASSES_PER_POOL);
                     slot.statistics.push(queries);
                 }
+                let queries = raw.create_query_pool(&info, None).checked("vkCreateQueryPool", "timestamps")?;
+                self.device.set_name(queries, "timestamps");
+                raw.reset_query_pool(queries, 0, 2 * PASSES_PER_POOL);
+                slot.timestamps.push(queries);
             }
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! The logical device with everything that objects need to be made, named, counted and freed.
 
 use super::error::{Checked, GpuError};
+use super::faults::{complain, failure_of};
 use super::features::{FeatureChain, OptionalFeatures};
 use super::instance::Instance;
 use super::selection::{Candidate, DeviceInfo};
@@ -32,6 +33,10 @@ pub struct Limits {
     pub sampler_anisotropy: f32,
 }
 
+/// Bits of an object's number that tell it from others of its device; the bits above tell the device.
+const NUMBER_BITS: u32 = 40;
+static DEVICES: AtomicU64 = AtomicU64::new(0);
+
 pub(super) struct Device {
     pub raw: ash::Device,
     pub queue: vk::Queue,
@@ -61,6 +66,8 @@ pub(super) struct Device {
     allocator: Mutex<Option<Allocator>>,
     graveyard: Mutex<Vec<Grave>>,
     memory: Mutex<BTreeMap<String, MemoryUse>>,
+    /// Most that all objects together may take.
+    pub max_memory_bytes: u64,
     pub physical: vk::PhysicalDevice,
     pub instance: Arc<Instance>,
 }
@@ -84,7 +91,12 @@ pub(super) enum Grave {
 }
 
 impl Device {
-    pub fn new(instance: Arc<Instance>, candidate: Candidate, enabled: OptionalFeatures) -> Result<Self, GpuError> {
+    pub fn new(
+        instance: Arc<Instance>,
+        candidate: Candidate,
+        enabled: OptionalFeatures,
+        robust: bool,
+    ) -> Result<Self, GpuError> {
         let Candidate { physical, info, support, .. } = candidate;
         let queue_family = support.graphics_queue_family.unwrap_or(0);
         let optional = enabled;
@@ -104,7 +116,7 @@ impl Device {
             let extensions = support.extensions.iter().copied().filter(skip_ray_query).filter(skip_swapchain);
             let extensions: Vec<_> = extensions.collect();
             let names: Vec<_> = extensions.iter().map(|e| e.as_ptr()).collect();
-            let mut f = FeatureChain::enabled(optional);
+            let mut f = FeatureChain::enabled(optional, robust);
             let mut create = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queues)
                 .enabled_extension_names(&names)
@@ -138,10 +150,12 @@ impl Device {
                 buffer_device_address: optional.ray_query,
                 allocation_sizes: gpu_allocator::AllocationSizes::default(),
             })
-            .map_err(|e| GpuError::NoDevice { wanted: None, reasons: format!("{}: {e}", info.name) })?;
+            .map_err(|e| GpuError::NoDevice { wanted: None, reasons: format!("{}: {e}", info.name) });
+            let allocator = allocator.inspect_err(|_| raw.destroy_device(None))?;
             let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
             let timeline = raw
                 .create_semaphore(&vk::SemaphoreCreateInfo::default().push_next(&mut kind), None)
+                .inspect_err(|_| raw.destroy_device(None))
                 .checked("vkCreateSemaphore", "start")?;
 
             let l = instance.raw.get_physical_device_properties(physical).limits;
@@ -187,10 +201,11 @@ impl Device {
                 open_recorders: AtomicU64::new(0),
                 is_lost: AtomicBool::new(false),
                 is_hung: AtomicBool::new(false),
-                next_id: AtomicU64::new(1),
+                next_id: AtomicU64::new((DEVICES.fetch_add(1, Ordering::Relaxed) + 1) << NUMBER_BITS),
                 allocator: Mutex::new(Some(allocator)),
                 graveyard: Mutex::default(),
                 memory: Mutex::default(),
+                max_memory_bytes: u64::MAX,
                 physical,
                 instance,
                 raw,
@@ -201,9 +216,14 @@ impl Device {
         }
     }
 
-    /// A number no other object of this device has.
+    /// A number that no other object has, of any device.
     pub fn new_id(&self) -> u64 {
         self.next_id.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Whether the object of that number is this device's.
+    pub fn owns(&self, id: u64) -> bool {
+        id >> NUMBER_BITS == self.next_id.load(Ordering::Relaxed) >> NUMBER_BITS
     }
 
     /// Names a Vulkan object for captures and validation messages; in release builds too.
@@ -276,6 +296,10 @@ impl Device {
         if requirements.size > available {
             return Err(fail(gpu_allocator::AllocationError::OutOfMemory));
         }
+        // The allocator takes from blocks that it has: most of its failures are no call's.
+        if failure_of("allocation").is_some() {
+            return Err(fail(gpu_allocator::AllocationError::OutOfMemory));
+        }
         let mut guard = lock(&self.allocator);
         let Some(allocator) = guard.as_mut() else { return Err(fail(gpu_allocator::AllocationError::OutOfMemory)) };
         let allocation = allocator
@@ -294,7 +318,8 @@ impl Device {
         Ok(allocation)
     }
 
-    /// Device memory that may still be taken: the driver's budget where it tells one, else the heap less what we hold.
+    /// Device memory that may still be taken: the driver's budget where it tells one, else the heap less what we hold;
+    /// in either case within what the options allow.
     pub fn available_bytes(&self) -> u64 {
         let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
         let mut properties = vk::PhysicalDeviceMemoryProperties2::default();
@@ -317,6 +342,7 @@ impl Device {
             })
             .max()
             .unwrap_or(0)
+            .min(self.max_memory_bytes.saturating_sub(held))
     }
 
     /// Bytes by owner, now and at most so far.
@@ -405,6 +431,8 @@ impl Drop for Device {
             self.completed.store(self.submitted.load(Ordering::Acquire), Ordering::Release);
             self.open_recorders.store(0, Ordering::Release);
             self.sweep();
+            let held: u64 = lock(&self.memory).values().map(|m| m.current_bytes).sum();
+            complain((held > 0).then(|| format!("{held} bytes of device memory are counted still")));
             self.raw.destroy_semaphore(self.timeline, None);
             drop(lock(&self.allocator).take());
             self.raw.destroy_device(None);

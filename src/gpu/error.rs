@@ -11,7 +11,7 @@ pub enum GpuError {
     NoDevice { wanted: Option<String>, reasons: String },
     #[error(
         "out of {heap} memory: {bytes} bytes for `{name}` could not be allocated ({available} bytes available); \
-         lower --elements or --size, or close other programs"
+         lower --elements or --size, raise --max-memory where it is given, or close other programs"
     )]
     OutOfMemory { name: String, bytes: u64, available: u64, heap: &'static str },
     #[error(

@@ -65,8 +65,9 @@ pub(super) struct FeatureChain {
 pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Support {
     // SAFETY: `physical` comes from `instance`; every chained struct outlives the call.
     unsafe {
-        let available: BTreeSet<_> = instance
-            .enumerate_device_extension_properties(physical)
+        let listed = instance.enumerate_device_extension_properties(physical);
+        let unlisted = listed.as_ref().err().map(|error| format!("a list of its extensions ({error:?})"));
+        let available: BTreeSet<_> = listed
             .unwrap_or_default()
             .iter()
             .filter_map(|e| e.extension_name_as_c_str().ok().map(CStr::to_owned))
@@ -115,6 +116,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
         let mut missing: Vec<String> =
             required.iter().filter(|(present, _)| *present == 0).map(|(_, name)| (*name).to_owned()).collect();
         missing.extend(REQUIRED_EXTENSIONS.iter().filter(|e| !has(e)).map(|e| e.to_string_lossy().into_owned()));
+        missing.extend(unlisted);
         let families = instance.get_physical_device_queue_family_properties(physical);
         let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let graphics_queue_family = families
@@ -157,11 +159,13 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
 }
 
 impl FeatureChain {
-    /// Exactly the features we use: what is required, and what of the optional is on.
-    pub fn enabled(optional: OptionalFeatures) -> Self {
+    /// Exactly the features we use: what is required, and what of the optional is on. `robust` gives accesses beyond the
+    /// end of a buffer a meaning (every device can): a wrong count in a pass must not become undefined behaviour.
+    pub fn enabled(optional: OptionalFeatures, robust: bool) -> Self {
         let on = |flag: bool| vk::Bool32::from(flag);
         Self {
             core: vk::PhysicalDeviceFeatures {
+                robust_buffer_access: on(robust),
                 shader_int64: vk::TRUE,
                 fragment_stores_and_atomics: vk::TRUE,
                 image_cube_array: vk::TRUE,

@@ -44,6 +44,11 @@ impl Format {
         self == Self::Depth32
     }
 
+    /// Whether shaders can write it as a storage image. sRGB images are textures only; no device need store to them.
+    pub(super) fn is_storable(self) -> bool {
+        !matches!(self, Self::Depth32 | Self::Rgba8Srgb)
+    }
+
     pub(super) fn aspect(self) -> vk::ImageAspectFlags {
         if self.is_depth() { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR }
     }
@@ -142,9 +147,8 @@ impl Image {
             vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
         usage |= match d.format {
             Format::Depth32 => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
-            // sRGB images are textures only; no device need store to them.
-            Format::Rgba8Srgb => vk::ImageUsageFlags::COLOR_ATTACHMENT,
-            _ => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE,
+            format if format.is_storable() => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE,
+            _ => vk::ImageUsageFlags::COLOR_ATTACHMENT,
         };
         let flags = if d.shape == Shape::CubeArray {
             vk::ImageCreateFlags::CUBE_COMPATIBLE
@@ -345,6 +349,11 @@ impl Sampler {
     pub(super) fn raw(&self) -> vk::Sampler {
         self.raw
     }
+
+    /// Whether both were made on the same device.
+    pub(super) fn is_beside(&self, image: &Image) -> bool {
+        Arc::ptr_eq(&self.device, &image.device)
+    }
 }
 
 impl Drop for Sampler {
@@ -387,6 +396,10 @@ impl TextureTable {
                 images.len(),
                 samplers.len()
             )));
+        }
+        let is_foreign = |other: &Arc<Device>| !Arc::ptr_eq(device, other);
+        if images.iter().any(|i| is_foreign(&i.device)) || samplers.iter().any(|s| is_foreign(&s.device)) {
+            return Err(GpuError::Refused("texture table: an image or sampler is of another device".into()));
         }
         // SAFETY: create infos outlive their calls; written descriptors refer to live objects that the table keeps.
         unsafe {
@@ -436,6 +449,10 @@ impl TextureTable {
 
     pub(super) fn set(&self) -> vk::DescriptorSet {
         self.set
+    }
+
+    pub(super) fn is_of(&self, device: &Arc<Device>) -> bool {
+        Arc::ptr_eq(&self.device, device)
     }
 }
 

@@ -1,6 +1,9 @@
 //! The Vulkan instance: loader, layers, and validation messages caught for tests and the log.
 
+use super::context::Options;
+use super::device::lock;
 use super::error::{Checked, GpuError};
+use super::faults;
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex};
@@ -34,6 +37,8 @@ pub(super) struct Instance {
     // The callback's user data; freed after the messenger.
     _callback_log: Box<MessageLog>,
     pub entry: ash::Entry,
+    // What `entry` may stand on.
+    _loader: ash::Entry,
 }
 
 /// Whether the Vulkan loader knows a layer of that name, switched on or not.
@@ -47,9 +52,11 @@ impl Instance {
     /// `validation` asks for the Khronos layer with core and synchronization checks; a missing layer is an error,
     /// so that silence always means that somebody listened.
     /// With `presents`, everything the loader offers for showing images in windows is on.
-    pub fn new(validation: bool, presents: bool) -> Result<Self, GpuError> {
+    pub fn new(options: &Options) -> Result<Self, GpuError> {
+        let &Options { validation, presents, .. } = options;
         // SAFETY: loading the Vulkan loader runs its initialisers, as every Vulkan program does.
-        let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
+        let loader = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
+        let entry = faults::entry(&loader);
         // SAFETY: plain queries and creation with structs that outlive the calls; the log box outlives the messenger.
         unsafe {
             let layers =
@@ -103,7 +110,14 @@ impl Instance {
             heuristic.p_values = (&raw const on).cast();
             let settings = [heuristic];
             let mut layer_settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
-            let enables = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut enables = vec![vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            if options.gpu_assisted {
+                enables.push(vk::ValidationFeatureEnableEXT::GPU_ASSISTED);
+                enables.push(vk::ValidationFeatureEnableEXT::GPU_ASSISTED_RESERVE_BINDING_SLOT);
+            }
+            if options.best_practices {
+                enables.push(vk::ValidationFeatureEnableEXT::BEST_PRACTICES);
+            }
             let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enables);
             let mut create = vk::InstanceCreateInfo::default()
                 .application_info(&app)
@@ -112,27 +126,38 @@ impl Instance {
             if validation {
                 create = create.push_next(&mut features).push_next(&mut layer_settings);
             }
-            let raw = entry
-                .create_instance(&create, None)
-                .map_err(|e| GpuError::NoLoader(format!("vkCreateInstance: {e:?}")))?;
-
             let messages = MessageLog::default();
             let callback_log = Box::new(messages.clone());
+            let mut info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                .message_severity(
+                    vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+                )
+                .message_type(
+                    vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+                )
+                .pfn_user_callback(Some(on_message))
+                .user_data(std::ptr::from_ref::<MessageLog>(&callback_log).cast_mut().cast::<c_void>());
+            // Also for what is said while the instance is made and unmade: objects that were left behind.
+            let for_messenger = info;
+            if validation {
+                create = create.push_next(&mut info);
+            }
+            let raw = entry.create_instance(&create, None).map_err(|e| match e {
+                vk::Result::ERROR_OUT_OF_HOST_MEMORY | vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+                    GpuError::from_call("vkCreateInstance", e, "start")
+                }
+                e => GpuError::NoLoader(format!("vkCreateInstance: {e:?}")),
+            })?;
+
             let messenger = if validation {
-                let loader = ext::debug_utils::Instance::new(&entry, &raw);
-                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
-                    .message_severity(
-                        vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-                    )
-                    .message_type(
-                        vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-                    )
-                    .pfn_user_callback(Some(on_message))
-                    .user_data(std::ptr::from_ref::<MessageLog>(&callback_log).cast_mut().cast::<c_void>());
-                let messenger = loader
-                    .create_debug_utils_messenger(&info, None)
-                    .checked("vkCreateDebugUtilsMessengerEXT", "start")?;
-                Some((loader, messenger))
+                let extension = ext::debug_utils::Instance::new(&entry, &raw);
+                match extension.create_debug_utils_messenger(&for_messenger, None) {
+                    Ok(messenger) => Some((extension, messenger)),
+                    Err(error) => {
+                        raw.destroy_instance(None);
+                        return Err(GpuError::from_call("vkCreateDebugUtilsMessengerEXT", error, "start"));
+                    }
+                }
             } else {
                 None
             };
@@ -146,6 +171,7 @@ impl Instance {
                 messenger,
                 _callback_log: callback_log,
                 entry,
+                _loader: loader,
             })
         }
     }
@@ -160,6 +186,7 @@ impl Drop for Instance {
             }
             self.raw.destroy_instance(None);
         }
+        faults::complain(std::mem::take(&mut *lock(&self.messages)));
     }
 }
 

@@ -85,6 +85,8 @@ pub struct Bindings<'b> {
     /// (id, 32 bits).
     pub(super) constants: Vec<(u32, u32)>,
     pub(super) textures: Option<&'b TextureTable>,
+    /// What cannot be bound, if anything: the first of it.
+    pub(super) refusal: Option<String>,
 }
 
 /// One bound object: what the descriptor needs and what the hazard check needs.
@@ -119,6 +121,10 @@ impl<'b> Bindings<'b> {
     }
 
     pub fn sampled(&mut self, sampled: Sampled<'b>) {
+        if !sampled.sampler.is_beside(sampled.image) {
+            self.refusal
+                .get_or_insert_with(|| format!("image `{}` has a sampler of another device", sampled.image.name()));
+        }
         let info = vk::DescriptorImageInfo::default()
             .image_view(sampled.image.sampled_view())
             .image_layout(vk::ImageLayout::GENERAL)
@@ -128,6 +134,11 @@ impl<'b> Bindings<'b> {
     }
 
     pub fn storage_image(&mut self, image: &'b Image) {
+        if !image.format.is_storable() {
+            self.refusal.get_or_insert_with(|| {
+                format!("image `{}` is {:?}, which cannot be written", image.name(), image.format)
+            });
+        }
         let info =
             vk::DescriptorImageInfo::default().image_view(image.storage_view()).image_layout(vk::ImageLayout::GENERAL);
         self.resources.push(Resource { id: image.id(), bytes: image.size_bytes(), handle: Handle::Image(info) });

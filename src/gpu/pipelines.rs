@@ -4,6 +4,7 @@ use super::device::{Device, Grave, MAX_TEXTURES, lock};
 use super::error::{Checked, GpuError};
 use super::image::Format;
 use super::pass::{Program, ResourceKind, StageKind};
+use crate::files;
 use ash::vk;
 use std::collections::HashMap;
 use std::io::Write as _;
@@ -79,7 +80,7 @@ impl Pipelines {
     /// `cache_file` is where the driver's pipeline cache is kept between runs; unreadable or foreign data is ignored.
     pub fn new(device: &Arc<Device>, cache_file: Option<PathBuf>) -> Result<Self, GpuError> {
         // The driver checks the header (vendor, device, UUID) of what it is given and starts empty if it does not fit.
-        let data = cache_file.as_ref().and_then(|f| std::fs::read(f).ok()).and_then(undamaged).unwrap_or_default();
+        let data = cache_file.as_ref().and_then(|f| files::read(f).ok()).and_then(undamaged).unwrap_or_default();
         let info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
         let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         let bindings = [vk::DescriptorSetLayoutBinding::default()
@@ -98,6 +99,7 @@ impl Pipelines {
             let layout = device
                 .raw
                 .create_descriptor_set_layout(&layout_info, None)
+                .inspect_err(|_| device.raw.destroy_pipeline_cache(cache, None))
                 .checked("vkCreateDescriptorSetLayout", "textures")?;
             (cache, layout)
         };
@@ -206,8 +208,12 @@ impl Pipelines {
             if program.push_constant_bytes > 0 {
                 info = info.push_constant_ranges(&push);
             }
-            let pipeline =
-                self.device.raw.create_pipeline_layout(&info, None).checked("vkCreatePipelineLayout", program.name)?;
+            let pipeline = self
+                .device
+                .raw
+                .create_pipeline_layout(&info, None)
+                .inspect_err(|_| self.device.raw.destroy_descriptor_set_layout(set, None))
+                .checked("vkCreatePipelineLayout", program.name)?;
             self.device.set_name(set, program.name);
             self.device.set_name(pipeline, program.name);
             Layouts { set, pipeline }
@@ -246,9 +252,20 @@ impl Pipelines {
                 StageKind::Vertex => vk::ShaderStageFlags::VERTEX,
                 StageKind::Fragment => vk::ShaderStageFlags::FRAGMENT,
             };
-            modules.push((flag, self.module(spirv, stage.file)?));
+            match self.module(spirv, stage.file) {
+                Ok(module) => modules.push((flag, module)),
+                Err(error) => {
+                    self.destroy(&modules);
+                    return Err(error);
+                }
+            }
         }
         Ok(modules)
+    }
+
+    fn destroy(&self, modules: &[(vk::ShaderStageFlags, vk::ShaderModule)]) {
+        // SAFETY: modules may go once their pipelines stand, or will never be made.
+        unsafe { modules.iter().for_each(|m| self.device.raw.destroy_shader_module(m.1, None)) };
     }
 
     fn make_compute(
@@ -266,10 +283,10 @@ impl Pipelines {
             .name(c"main")
             .specialization_info(&special);
         let info = vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout);
-        // SAFETY: complete create info; modules may go once the pipeline stands.
+        // SAFETY: complete create info over live modules.
         unsafe {
             let made = self.device.raw.create_compute_pipelines(self.cache, &[info], None);
-            modules.iter().for_each(|m| self.device.raw.destroy_shader_module(m.1, None));
+            self.destroy(&modules);
             made.map(|p| p[0]).map_err(|(_, e)| e).checked("vkCreateComputePipelines", program.name)
         }
     }
@@ -347,10 +364,10 @@ impl Pipelines {
             .dynamic_state(&dynamic)
             .layout(layout)
             .push_next(&mut rendering);
-        // SAFETY: complete create info; modules may go once the pipeline stands.
+        // SAFETY: complete create info over live modules.
         unsafe {
             let made = self.device.raw.create_graphics_pipelines(self.cache, &[info], None);
-            modules.iter().for_each(|m| self.device.raw.destroy_shader_module(m.1, None));
+            self.destroy(&modules);
             made.map(|p| p[0]).map_err(|(_, e)| e).checked("vkCreateGraphicsPipelines", program.name)
         }
     }
@@ -361,12 +378,11 @@ impl Pipelines {
         let Some(folder) = file.parent() else { return Ok(()) };
         // SAFETY: the cache is alive.
         let data = unsafe { self.device.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
-        std::fs::create_dir_all(folder)?;
-        let mut temporary = tempfile::NamedTempFile::new_in(folder)?;
-        temporary.write_all(blake3::hash(&data).as_bytes())?;
-        temporary.write_all(&data)?;
-        temporary.persist(file)?;
-        Ok(())
+        files::create_dir_all(folder)?;
+        let mut part = files::Part::create(&tempfile::Builder::new(), file)?;
+        part.write_all(blake3::hash(&data).as_bytes())?;
+        part.write_all(&data)?;
+        part.finish()
     }
 }
 

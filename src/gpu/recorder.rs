@@ -4,11 +4,11 @@ use super::context::Context;
 use super::descriptors::push_descriptors;
 use super::error::{Checked, GpuError};
 use super::hazards::{Access, Hazards};
-use super::image::Image;
 use super::pass::{Bindings, Pass, Program};
 use super::pass_hashes::PendingHashes;
 use super::pipelines::{Bound, RasterState, stage_flags};
 use super::profiler::Cost;
+use super::target::{Target, attachment};
 use super::{Buffer, RawBuffer};
 use ash::vk;
 use std::cell::Cell;
@@ -44,20 +44,6 @@ impl From<[u32; 2]> for Threads {
     fn from(size: [u32; 2]) -> Self {
         Self::Grid(size[0], size[1], 1)
     }
-}
-
-/// What an attachment holds before the first draw.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Load {
-    Keep,
-    Clear([f32; 4]),
-}
-
-/// What a raster pass draws into: images of one size.
-pub struct Target<'a> {
-    pub color: Vec<(&'a Image, Load)>,
-    /// Depth image, layer, load.
-    pub depth: Option<(&'a Image, u32, Load)>,
 }
 
 /// Device objects of one recording, reused from submission to submission.
@@ -211,8 +197,9 @@ impl<'c> Recorder<'c> {
         let mut attachments: Vec<Access> =
             target.color.iter().map(|(image, _)| Access { id: image.id(), reads: true, writes: true }).collect();
         attachments.extend(target.depth.iter().map(|(image, ..)| Access { id: image.id(), reads: true, writes: true }));
-        let Some((width, height)) = target.extent() else {
-            return self.fail(GpuError::Refused(format!("{}: nothing to draw into", P::PROGRAM.name)));
+        let (width, height) = match target.extent() {
+            Ok(extent) => extent,
+            Err(wrong) => return self.fail(GpuError::Refused(format!("{}: {wrong}", P::PROGRAM.name))),
         };
         let color: Vec<_> = target.color.iter().map(|(image, _)| image.format).collect();
         let depth = target.depth.map(|(image, ..)| image.format);
@@ -319,6 +306,11 @@ impl<'c> Recorder<'c> {
         if self.error.is_some() {
             return;
         }
+        let is_foreign = bindings.textures.is_some_and(|table| !table.is_of(&self.context.device));
+        let foreign = is_foreign.then(|| "its textures are of another device".to_owned());
+        if let Some(refusal) = bindings.refusal.clone().or(foreign) {
+            return self.fail(GpuError::Refused(format!("{}: {refusal}", program.name)));
+        }
         let mut accesses: Vec<Access> = program
             .bindings
             .iter()
@@ -369,6 +361,10 @@ impl<'c> Recorder<'c> {
     ) {
         if self.error.is_some() || self.is_lost_here {
             return;
+        }
+        if !accesses.iter().all(|access| self.context.device.owns(access.id)) {
+            let message = format!("{name}: it is given an object of another device; make all objects by one context");
+            return self.fail(GpuError::Refused(message));
         }
         let needs_barrier = self.hazards.needs_barrier(accesses);
         if (needs_barrier && !self.context.options.skip_barriers) || self.context.options.full_barriers {
@@ -451,36 +447,6 @@ impl Drop for Recorder<'_> {
         self.context.device.open_recorders.fetch_sub(1, Ordering::AcqRel);
         self.context.device.sweep();
     }
-}
-
-impl Target<'_> {
-    fn extent(&self) -> Option<(u32, u32)> {
-        let first = self.color.first().map(|(image, _)| *image).or(self.depth.map(|(image, ..)| image))?;
-        Some((first.width, first.height))
-    }
-
-    fn size_bytes(&self) -> u64 {
-        let color: u64 = self.color.iter().map(|(image, _)| image.size_bytes()).sum();
-        color + self.depth.map_or(0, |(image, ..)| image.size_bytes() / u64::from(image.layers))
-    }
-}
-
-fn attachment(view: vk::ImageView, load: Load, depth: bool) -> vk::RenderingAttachmentInfo<'static> {
-    let (op, value) = match load {
-        Load::Keep => (vk::AttachmentLoadOp::LOAD, [0.0; 4]),
-        Load::Clear(value) => (vk::AttachmentLoadOp::CLEAR, value),
-    };
-    let clear = if depth {
-        vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: value[0], stencil: 0 } }
-    } else {
-        vk::ClearValue { color: vk::ClearColorValue { float32: value } }
-    };
-    vk::RenderingAttachmentInfo::default()
-        .image_view(view)
-        .image_layout(vk::ImageLayout::GENERAL)
-        .load_op(op)
-        .store_op(vk::AttachmentStoreOp::STORE)
-        .clear_value(clear)
 }
 
 /// Bytes of everything a pass reads (or writes), each bound object once.

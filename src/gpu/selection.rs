@@ -1,6 +1,7 @@
 //! Which device: all of them are listed, the unusable ones with the reason.
 
-use super::error::GpuError;
+use super::context::Options;
+use super::error::{Checked as _, GpuError};
 use super::features::{self, OptionalFeatures, Support};
 use super::instance::Instance;
 use ash::vk;
@@ -33,10 +34,14 @@ pub(super) struct Candidate {
 }
 
 /// Every device of the instance, in the driver's order.
-pub(super) fn candidates(instance: &Instance) -> Vec<Candidate> {
+pub(super) fn candidates(instance: &Instance) -> Result<Vec<Candidate>, GpuError> {
     // SAFETY: plain queries on a live instance.
-    let devices = unsafe { instance.raw.enumerate_physical_devices() }.unwrap_or_default();
-    devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect()
+    let devices = match unsafe { instance.raw.enumerate_physical_devices() } {
+        // What loaders answer where there is no driver.
+        Err(vk::Result::ERROR_INITIALIZATION_FAILED) => Vec::new(),
+        devices => devices.checked("vkEnumeratePhysicalDevices", "start")?,
+    };
+    Ok(devices.into_iter().enumerate().map(|(index, physical)| candidate(instance, index, physical)).collect())
 }
 
 fn candidate(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> Candidate {
@@ -119,6 +124,6 @@ pub fn choose_device<'d>(devices: &'d [DeviceInfo], wanted: Option<&str>) -> Res
 
 /// Every device, usable or not, for `linklight devices`.
 pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
-    let instance = Instance::new(false, false)?;
-    Ok(candidates(&instance).into_iter().map(|c| c.info).collect())
+    let instance = Instance::new(&Options::default())?;
+    Ok(candidates(&instance)?.into_iter().map(|c| c.info).collect())
 }

@@ -19,8 +19,9 @@ pub struct TexelBuffer {
 impl TexelBuffer {
     pub(super) fn new(device: &Arc<Device>, name: &str, len: usize) -> Result<Self, GpuError> {
         let allowed = 16 * u64::from(device.limits.texel_buffer_elements);
-        if len as u64 * 16 > allowed {
-            return Err(GpuError::StorageRange { name: name.to_owned(), bytes: len as u64 * 16, allowed });
+        let bytes = (len as u64).saturating_mul(16);
+        if bytes > allowed {
+            return Err(GpuError::StorageRange { name: name.to_owned(), bytes, allowed });
         }
         let buffer = Buffer::new(device, name, len)?;
         let info = vk::BufferViewCreateInfo::default()

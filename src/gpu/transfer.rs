@@ -5,7 +5,7 @@ use super::buffer::RawBuffer;
 use super::context::Context;
 use super::error::GpuError;
 use super::hazards::Access;
-use super::image::Image;
+use super::image::{Format, Image};
 use super::profiler::Cost;
 use super::recorder::Recorder;
 use ash::vk;
@@ -79,7 +79,14 @@ impl Context {
 
     /// Reads mip level 0 of one layer back, rows top to bottom; `T` is one pixel.
     pub fn download_image<T: Pod>(&self, image: &Image, layer: u32) -> Result<Vec<T>, GpuError> {
-        let bytes = u64::from(image.width) * u64::from(image.height) * image.format.bytes_per_pixel();
+        let pixel = image.format.bytes_per_pixel();
+        if layer >= image.layers || size_of::<T>() as u64 != pixel {
+            let (name, layers, given) = (image.name(), image.layers, size_of::<T>());
+            return Err(GpuError::Refused(format!(
+                "image `{name}`: layer {layer} of {layers} read as pixels of {given} bytes, they have {pixel}"
+            )));
+        }
+        let bytes = u64::from(image.width) * u64::from(image.height) * pixel;
         let mut recorder = self.recorder("download")?;
         let staging = RawBuffer::new(
             &self.device,
@@ -144,7 +151,7 @@ impl Recorder<'_> {
 
     /// Sets every 32-bit word of `buffer` to `word`.
     pub fn fill<T>(&mut self, buffer: &Buffer<T>, word: u32) {
-        let bytes = buffer.size_bytes();
+        let bytes = buffer.size_bytes() & !3;
         if bytes == 0 {
             return;
         }
@@ -152,7 +159,7 @@ impl Recorder<'_> {
         let (raw, access) = (buffer.raw(), Access { id: buffer.id(), reads: false, writes: true });
         self.timed("transfer/fill", &[access], Cost { bytes_read: 0, bytes_written: bytes }, 0, None, |recorder| {
             // SAFETY: fills whole words inside the buffer.
-            unsafe { device.raw.cmd_fill_buffer(recorder.commands(), raw, 0, bytes & !3, word) };
+            unsafe { device.raw.cmd_fill_buffer(recorder.commands(), raw, 0, bytes, word) };
         });
     }
 
@@ -161,7 +168,7 @@ impl Recorder<'_> {
         if source.is_empty() {
             return;
         }
-        if source.len() > target.len() {
+        if source.len() > target.len() || source.id() == target.id() {
             let message =
                 format!("copy of `{}` ({}) into `{}` ({})", source.name(), source.len(), target.name(), target.len());
             return self.fail(GpuError::Refused(message));
@@ -212,6 +219,10 @@ impl Recorder<'_> {
 
     /// Sets every pixel of a colour image.
     pub fn clear_image(&mut self, image: &Image, color: [f32; 4]) {
+        if image.format.is_depth() {
+            return self
+                .fail(GpuError::Refused(format!("image `{}` is a depth image and has no colour", image.name())));
+        }
         let access = [Access { id: image.id(), reads: false, writes: true }];
         let cost = Cost { bytes_read: 0, bytes_written: image.size_bytes() };
         let device = self.context().device.clone();
@@ -232,6 +243,10 @@ impl Recorder<'_> {
 
     /// Fills mip levels 1.. by halving, averaged in linear light (sRGB images are decoded by the blit).
     pub fn generate_mips(&mut self, image: &Image) {
+        if image.mip_levels > 1 && (image.format.is_depth() || image.format == Format::R32Uint) {
+            let message = format!("image `{}` is {:?}, which cannot be averaged", image.name(), image.format);
+            return self.fail(GpuError::Refused(message));
+        }
         let device = self.context().device.clone();
         for level in 1..image.mip_levels {
             let access = [Access { id: image.id(), reads: true, writes: true }];

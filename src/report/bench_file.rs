@@ -15,6 +15,7 @@ use serde_json::{Map, Value};
 use super::profile::Device;
 use super::statistics::{Estimate, Shift, Verdict};
 use super::write::{FileError, write_text};
+use crate::files;
 
 pub const SCHEMA: &str = "linklight-bench";
 pub const VERSION: u32 = 1;
@@ -130,7 +131,7 @@ impl BenchFile {
 
     /// Refuses other schemas and versions, and times that no clock gives.
     pub fn read(path: &Path) -> Result<Self, BenchFileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
+        let text = files::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
         let refuse = |reason: String| BenchFileError::Format { path: path.display().to_string(), reason };
         let value: Value = serde_json::from_str(&text).map_err(|error| refuse(error.to_string()))?;
         if value["schema"] != SCHEMA || value["version"] != VERSION {

@@ -4,7 +4,6 @@
 //! map, and several of them would be written in a different order at every run.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -18,8 +17,11 @@ use glam::Vec3;
 
 use super::image::{Channel, Metadata, Picture, PictureError, check_length, check_size};
 use super::write::{FileError, write_whole};
+use crate::files::File;
 
 const METADATA_ATTRIBUTE: &str = "linklight";
+/// Most channels of the largest picture that is read; ours have up to 16.
+const MAX_CHANNELS: u64 = 16;
 
 pub(super) fn write(path: &Path, picture: &Picture) -> Result<(), PictureError> {
     let fail = |reason: String| PictureError::Encode { path: path.to_owned(), format: "EXR", reason };
@@ -55,15 +57,25 @@ pub(super) fn write(path: &Path, picture: &Picture) -> Result<(), PictureError> 
     write_whole(path, |file| image.write().to_buffered(file).map_err(|error| fail(error.to_string())))
 }
 
-pub(super) fn read(path: &Path) -> Result<Picture, PictureError> {
+pub(super) fn read(path: &Path, max_pixels: u64) -> Result<Picture, PictureError> {
     let fail = |reason: String| PictureError::Decode { path: path.to_owned(), format: "EXR", reason };
     let open = || File::open(path).map_err(|source| FileError::new("open", path, source));
 
     // Sizes first: nothing is allocated for a file that only claims to be large.
     let headers =
         MetaData::read_from_buffered(BufReader::new(open()?), false).map_err(|error| fail(error.to_string()))?;
+    let mut samples: u64 = 0;
     for header in &headers.headers {
-        check_size(path, header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+        let [width, height] = [header.layer_size.width(), header.layer_size.height()].map(|side| side as u64);
+        check_size(path, width, height, max_pixels)?;
+        samples = samples.saturating_add((width * height).saturating_mul(header.channels.list.len() as u64));
+    }
+    // All parts are decoded at once, each channel for itself.
+    let allowed = MAX_CHANNELS * max_pixels;
+    if samples > allowed {
+        return Err(fail(format!(
+            "it states {samples} samples in all its channels and parts, at most {allowed} are read"
+        )));
     }
 
     let image = exr::prelude::read()

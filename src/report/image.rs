@@ -7,7 +7,6 @@
 //! It does not tone-map: [`super::tonemap`] makes the bytes that [`write_png`] stores.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, Read as _};
 use std::path::{Path, PathBuf};
 
@@ -17,6 +16,7 @@ pub use super::png_file::write_png;
 use super::tonemap::srgb_decode;
 use super::write::FileError;
 use super::{exr_file, png_file};
+use crate::files::File;
 
 /// Longest side of a picture, pixels.
 pub const MAX_SIDE: u32 = 16_384;
@@ -141,12 +141,17 @@ impl Picture {
 /// Write RGB f32 and every channel as a losslessly compressed EXR. The same picture gives the same bytes.
 pub fn write_exr(path: &Path, picture: &Picture) -> Result<(), PictureError> {
     check_length("rgb", picture.rgb.len(), picture.pixel_count())?;
-    check_size(path, picture.width.into(), picture.height.into())?;
+    check_size(path, picture.width.into(), picture.height.into(), MAX_PIXELS)?;
     exr_file::write(path, picture)
 }
 
 /// Read a PNG, EXR or HDR file, whichever its content says it is.
 pub fn read(path: &Path) -> Result<Picture, PictureError> {
+    read_within(path, MAX_PIXELS)
+}
+
+/// As [`read`], of at most `max_pixels` pixels.
+pub fn read_within(path: &Path, max_pixels: u64) -> Result<Picture, PictureError> {
     let mut start = [0; 8];
     let mut file = File::open(path).map_err(|source| FileError::new("open", path, source))?;
     let metadata = file.metadata().map_err(|source| FileError::new("read", path, source))?;
@@ -156,9 +161,9 @@ pub fn read(path: &Path) -> Result<Picture, PictureError> {
     }
     let length = read_up_to(&mut file, &mut start).map_err(|source| FileError::new("read", path, source))?;
     match &start[..length] {
-        b"\x89PNG\r\n\x1a\n" => png_file::read(path),
-        [0x76, 0x2f, 0x31, 0x01, ..] => exr_file::read(path),
-        [b'#', b'?', ..] => read_hdr(path),
+        b"\x89PNG\r\n\x1a\n" => png_file::read(path, max_pixels),
+        [0x76, 0x2f, 0x31, 0x01, ..] => exr_file::read(path, max_pixels),
+        [b'#', b'?', ..] => read_hdr(path, max_pixels),
         _ => Err(PictureError::UnknownFormat(path.to_owned())),
     }
 }
@@ -174,8 +179,8 @@ fn read_up_to(file: &mut File, buffer: &mut [u8]) -> std::io::Result<usize> {
     Ok(length)
 }
 
-fn read_hdr(path: &Path) -> Result<Picture, PictureError> {
-    let decoded = decode(path, "HDR", ::image::ImageFormat::Hdr)?.into_rgb32f();
+fn read_hdr(path: &Path, max_pixels: u64) -> Result<Picture, PictureError> {
+    let decoded = decode(path, "HDR", ::image::ImageFormat::Hdr, max_pixels)?.into_rgb32f();
     let (width, height) = decoded.dimensions();
     let rgb = decoded.pixels().map(|pixel| Vec3::from_array(pixel.0)).collect();
     Picture::new(width, height, rgb)
@@ -186,6 +191,7 @@ pub(super) fn decode(
     path: &Path,
     format: &'static str,
     kind: ::image::ImageFormat,
+    max_pixels: u64,
 ) -> Result<::image::DynamicImage, PictureError> {
     use ::image::ImageDecoder as _;
     let broken =
@@ -194,7 +200,7 @@ pub(super) fn decode(
     let reader = ::image::ImageReader::with_format(BufReader::new(file), kind);
     let decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();
-    check_size(path, width.into(), height.into())?;
+    check_size(path, width.into(), height.into(), max_pixels)?;
     ::image::DynamicImage::from_decoder(decoder).map_err(broken)
 }
 
@@ -204,9 +210,9 @@ pub(super) fn display_picture(width: u32, height: u32, samples: impl Iterator<It
     Picture { width, height, rgb, encoding: Encoding::Display, ..Picture::default() }
 }
 
-pub(super) fn check_size(path: &Path, width: u64, height: u64) -> Result<(), PictureError> {
+pub(super) fn check_size(path: &Path, width: u64, height: u64, max_pixels: u64) -> Result<(), PictureError> {
     let side = u64::from(MAX_SIDE);
-    if width == 0 || height == 0 || width > side || height > side || width * height > MAX_PIXELS {
+    if width == 0 || height == 0 || width > side || height > side || width * height > max_pixels {
         return Err(PictureError::TooLarge { path: path.to_owned(), width, height });
     }
     Ok(())

@@ -14,6 +14,7 @@ use serde_json::{Map, Value};
 
 use super::profile::Device;
 use super::write::{FileError, write_text};
+use crate::files;
 
 pub const SCHEMA: &str = "linklight-hashes";
 pub const VERSION: u32 = 1;
@@ -93,7 +94,7 @@ impl HashFile {
     /// Refuses other schemas and versions.
     pub fn read(path: &Path) -> Result<Self, HashFileError> {
         let fail = |reason: String| HashFileError::Format { path: path.display().to_string(), reason };
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
+        let text = files::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
         let file: Self = serde_json::from_str(&text).map_err(|error| fail(error.to_string()))?;
         if file.schema != SCHEMA || file.version != VERSION {
             return Err(fail(format!("its schema is {:?}, version {}", file.schema, file.version)));

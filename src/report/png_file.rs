@@ -1,15 +1,15 @@
 //! PNG: what a display shows, eight bits a channel, with text chunks.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use super::image::{Metadata, Picture, PictureError, check_length, check_size, decode, display_picture};
+use super::image::{MAX_PIXELS, Metadata, Picture, PictureError, check_length, check_size, decode, display_picture};
 use super::write::write_whole;
+use crate::files::File;
 
 /// Write tone-mapped sRGB bytes (`width * height * 3`, row 0 at the top) with `metadata` as text chunks.
 pub fn write_png(path: &Path, width: u32, height: u32, bytes: &[u8], metadata: &Metadata) -> Result<(), PictureError> {
-    check_size(path, width.into(), height.into())?;
+    check_size(path, width.into(), height.into(), MAX_PIXELS)?;
     check_length("bytes", bytes.len(), width as usize * height as usize * 3)?;
     let fail = |error: png::EncodingError| PictureError::Encode {
         path: path.to_owned(),
@@ -36,8 +36,8 @@ pub fn write_png(path: &Path, width: u32, height: u32, bytes: &[u8], metadata: &
 }
 
 /// Read a PNG of any colour type; alpha is dropped, 16-bit samples keep their precision.
-pub(super) fn read(path: &Path) -> Result<Picture, PictureError> {
-    let decoded = decode(path, "PNG", ::image::ImageFormat::Png)?;
+pub(super) fn read(path: &Path, max_pixels: u64) -> Result<Picture, PictureError> {
+    let decoded = decode(path, "PNG", ::image::ImageFormat::Png, max_pixels)?;
     let (width, height) = (decoded.width(), decoded.height());
     let sixteen_bit = decoded.color().bytes_per_pixel() / decoded.color().channel_count() == 2;
     let mut picture = if sixteen_bit {
@@ -57,6 +57,11 @@ fn read_metadata(path: &Path) -> Metadata {
     let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else { return Metadata::new() };
     let info = reader.info();
     let latin = info.uncompressed_latin1_text.iter().map(|chunk| (chunk.keyword.clone(), chunk.text.clone()));
-    let utf8 = info.utf8_text.iter().filter_map(|chunk| Some((chunk.keyword.clone(), chunk.get_text().ok()?)));
+    let utf8 = info.utf8_text.iter().filter_map(|chunk| {
+        // Decompressed within the decoder's limit: `get_text` alone has none, and a kilobyte can become a gigabyte.
+        let mut chunk = chunk.clone();
+        chunk.decompress_text().ok()?;
+        Some((chunk.keyword.clone(), chunk.get_text().ok()?))
+    });
     latin.chain(utf8).collect()
 }

@@ -34,6 +34,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::write::{FileError, write_text};
+use crate::files;
 
 pub const SCHEMA: &str = "linklight-profile";
 pub const VERSION: u32 = 1;
@@ -189,7 +190,7 @@ impl Profile {
 
     /// Read a file that [`Profile::write`] wrote.
     pub fn read(path: &Path) -> Result<Self, ProfileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
+        let text = files::read_to_string(path).map_err(|source| FileError::new("read", path, source))?;
         let content = |reason: String| ProfileError::Content { path: path.display().to_string(), reason };
         let value: Value = serde_json::from_str(&text).map_err(|error| content(error.to_string()))?;
         if value["schema"] != SCHEMA {

@@ -2,9 +2,10 @@
 //!
 //! A reader (or an interrupted run) therefore sees the old file or the new one, never a half of either.
 
-use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+
+use crate::files::{self, Part};
 
 /// A file that could not be read or written: the action, the path and the system's reason.
 #[derive(Debug, thiserror::Error)]
@@ -26,11 +27,10 @@ impl FileError {
 /// (a folder, a device) is refused.
 pub fn write_whole<E: From<FileError>>(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&mut File>) -> Result<(), E>,
+    fill: impl FnOnce(&mut BufWriter<&mut Part>) -> Result<(), E>,
 ) -> Result<(), E> {
     let fail = |source| FileError::new("write", path, source);
     let target = writable_target(path).map_err(fail)?;
-    let folder = folder_of(&target);
 
     let mut builder = tempfile::Builder::new();
     builder.prefix(".linklight-").suffix(".part");
@@ -40,15 +40,13 @@ pub fn write_whole<E: From<FileError>>(
         use std::os::unix::fs::PermissionsExt as _;
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let mut temporary = builder.tempfile_in(folder).map_err(fail)?;
+    let mut part = Part::create(&builder, &target).map_err(fail)?;
     {
-        let mut writer = BufWriter::new(temporary.as_file_mut());
+        let mut writer = BufWriter::new(&mut part);
         fill(&mut writer)?;
         writer.flush().map_err(fail)?;
     }
-    temporary.as_file().sync_all().map_err(fail)?;
-    temporary.persist(&target).map_err(|error| fail(error.error))?;
-    Ok(())
+    Ok(part.finish().map_err(fail)?)
 }
 
 /// [`write_whole`] for text.
@@ -66,7 +64,7 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let fail = |source| FileError::new("write", path, source);
     let target = writable_target(path).map_err(fail)?;
     let folder = folder_of(&target);
-    match std::fs::metadata(folder) {
+    match files::metadata(folder) {
         Ok(metadata) if metadata.is_dir() => Ok(()),
         Ok(_) => Err(fail(io::Error::new(io::ErrorKind::NotADirectory, "its parent is not a folder"))),
         Err(_) => Err(fail(io::Error::new(
@@ -81,7 +79,7 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 fn writable_target(path: &Path) -> io::Result<PathBuf> {
-    match std::fs::metadata(path) {
+    match files::metadata(path) {
         Ok(metadata) if metadata.is_file() => std::fs::canonicalize(path),
         Ok(metadata) if metadata.is_dir() => {
             Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; give a file name"))

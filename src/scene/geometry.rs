@@ -70,7 +70,7 @@ pub struct Part {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum GeometryError {
     #[error(
-        "{what} needs {needed} bytes, {available} are allowed; use fewer elements (--elements) or fewer instances, or raise max_memory_bytes"
+        "{what} needs {needed} bytes, {available} are allowed; use fewer elements (--elements) or fewer instances, or raise --max-memory"
     )]
     OutOfMemory { what: &'static str, needed: u64, available: u64 },
     #[error("{what}: {needed} needed, at most {allowed} can be indexed; use fewer elements (--elements) or instances")]

@@ -49,6 +49,17 @@ pub struct Scene {
     pub notes: Vec<String>,
 }
 
+impl Scene {
+    /// Bytes of its pictures and tables, which is nearly all that it takes.
+    pub fn size_bytes(&self) -> u64 {
+        let images = self.images.iter().map(|image| image.rgba.len());
+        let primitives = self.meshes.iter().flat_map(|mesh| &mesh.primitives).map(Primitive::size_bytes);
+        let clips = self.clips.iter().flat_map(|clip| &clip.channels).map(|channel| channel.times.len() * 20);
+        let nodes = self.nodes.len() * size_of::<Node>();
+        images.chain(primitives).chain(clips).chain([nodes]).fold(0, |sum: u64, bytes| sum.saturating_add(bytes as u64))
+    }
+}
+
 #[derive(Debug, Clone, Default)]
 pub struct Node {
     pub name: String,
@@ -101,6 +112,17 @@ pub struct Primitive {
     pub morph_targets: Vec<MorphTarget>,
     pub triangles: Vec<[u32; 3]>,
     pub material: u32,
+}
+
+impl Primitive {
+    fn size_bytes(&self) -> usize {
+        let targets = self.morph_targets.iter();
+        let deltas: usize = targets.map(|t| t.positions.len() + t.normals.len() + t.tangents.len()).sum();
+        size_of::<Vec3>() * (self.positions.len() + self.normals.len() + deltas + self.triangles.len())
+            + size_of::<Vec2>() * (self.uv[0].len() + self.uv[1].len())
+            + size_of::<Vec4>() * (self.tangents.len() + self.colors.len() + self.joints.len())
+            + size_of::<[f32; 8]>() * self.joint_weights.len()
+    }
 }
 
 /// Displacements per vertex; empty where the target does not move that attribute.

@@ -1,5 +1,7 @@
 //! Small glTF files made in memory, and where the shared ones are.
 
+use linklight::scene::gltf::Fault;
+use linklight::scene::{Scene, SceneError};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -257,4 +259,73 @@ pub fn png(width: u32, height: u32) -> Vec<u8> {
     let image = image::RgbaImage::from_pixel(width, height, image::Rgba([128, 128, 255, 255]));
     image.write_to(&mut bytes, image::ImageFormat::Png).expect("memory to write to");
     bytes.into_inner()
+}
+
+/// What came of loading a file, in one line: `accept`, `note: ...` with all notes, or `reject POINTER: RULE`.
+pub fn verdict(result: &Result<Scene, SceneError>) -> String {
+    match result.as_ref().map_err(|error| &error.fault) {
+        Ok(scene) if scene.notes.is_empty() => "accept".into(),
+        Ok(scene) => format!("note: {}", scene.notes.join(" | ").replace(['\t', '\n'], " ")),
+        Err(fault) => format!("reject {}", rule(fault)),
+    }
+}
+
+/// Where and by which rule a file is refused, without the value seen and without advice.
+pub fn rule(fault: &Fault) -> String {
+    match fault {
+        Fault::Invalid { pointer, rule, .. } | Fault::TooLarge { pointer, rule, .. } => format!("{pointer}: {rule}"),
+        Fault::RefusedUri { pointer, rule, .. } => format!("{pointer}: {rule}"),
+        Fault::RequiredExtension { pointer, names, .. } => format!("{pointer}: {names}"),
+        Fault::Container { rule, .. } => format!("the .glb container: {rule}"),
+        Fault::Json { .. } => "the JSON: it cannot be parsed".into(),
+        Fault::Version { seen } => format!("the version: {seen}"),
+        Fault::Unreadable { what, .. } => format!("{}: cannot be read", what.rsplit('/').next().unwrap_or(what)),
+        other => other.to_string(),
+    }
+}
+
+/// Adds nodes for every mesh (with every material), camera, light and skin, and makes one scene of all root nodes.
+pub fn show_everything(document: &mut Value) {
+    let count = |list: &Value| list.as_array().map_or(0, Vec::len);
+    let lights = count(&document["extensions"]["KHR_lights_punctual"]["lights"]);
+    let (meshes, cameras, skins) = (count(&document["meshes"]), count(&document["cameras"]), count(&document["skins"]));
+    let materials = count(&document["materials"]);
+    let mut added: Vec<Value> = Vec::new();
+    for mesh in 0..meshes {
+        added.push(json!({ "mesh": mesh }));
+        (0..skins).for_each(|skin| added.push(json!({ "mesh": mesh, "skin": skin })));
+    }
+    added.extend((0..cameras).map(|camera| json!({ "camera": camera })));
+    added.extend((0..lights).map(|light| json!({ "extensions": { "KHR_lights_punctual": { "light": light } } })));
+
+    // One triangle of zeros for each material, so that its textures are looked at.
+    let Some(root) = document.as_object_mut() else { return };
+    let mut push = |list: &str, value: Value| {
+        let list = root.entry(list).or_insert_with(|| json!([]));
+        list.as_array_mut().map(|list| {
+            list.push(value);
+            list.len() - 1
+        })
+    };
+    if materials > 0 {
+        let accessor = push("accessors", json!({ "componentType": 5126, "type": "VEC3", "count": 3 }));
+        for material in 0..materials {
+            let primitive = json!({ "attributes": { "POSITION": accessor }, "material": material });
+            if let Some(mesh) = push("meshes", json!({ "primitives": [primitive] })) {
+                added.push(json!({ "mesh": mesh }));
+            }
+        }
+    }
+    for node in added {
+        push("nodes", node);
+    }
+    if let Some(nodes) = document["nodes"].as_array() {
+        let children: Vec<u64> =
+            nodes.iter().filter_map(|node| node["children"].as_array()).flatten().filter_map(Value::as_u64).collect();
+        let roots: Vec<u64> = (0..nodes.len() as u64).filter(|node| !children.contains(node)).collect();
+        document["scenes"] = json!([{ "nodes": roots }]);
+        if let Some(root) = document.as_object_mut() {
+            root.remove("scene");
+        }
+    }
 }

@@ -6,6 +6,8 @@ mod common;
 mod basics;
 mod errors;
 mod images;
+mod misuse;
 mod passes;
 mod pipeline_cache;
+mod planted;
 mod transfers;

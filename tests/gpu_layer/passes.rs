@@ -88,6 +88,30 @@ fn a_draw_of_nothing_still_clears() {
     recorder.draw(&pass, &Target { color: vec![], depth: None }, state, 3, 1);
     let message = recorder.submit().unwrap_err().to_string();
     assert!(message.contains("display/shadow_map") && message.contains("nothing to draw into"), "{message}");
+
+    let other = context
+        .image(&ImageDescription {
+            name: "test/other",
+            width: 9,
+            height: 9,
+            layers: 1,
+            mip_levels: 1,
+            format: Format::Rgba8,
+            shape: Shape::Flat,
+        })
+        .unwrap();
+    let keep = Load::Keep;
+    for (wrong, word) in [
+        (Target { color: vec![], depth: Some((&depth, depth.layers, keep)) }, "is no depth"),
+        (Target { color: vec![(&other, keep)], depth: Some((&depth, 0, keep)) }, "one size"),
+        (Target { color: vec![], depth: Some((&other, 0, keep)) }, "is no depth"),
+        (Target { color: vec![(&depth, keep)], depth: None }, "as colour"),
+    ] {
+        let mut recorder = context.recorder("test").unwrap();
+        recorder.draw(&pass, &wrong, state, 3, 1);
+        let message = recorder.submit().unwrap_err().to_string();
+        assert!(message.contains("display/shadow_map") && message.contains(word), "{message}");
+    }
 }
 
 #[test]

@@ -114,7 +114,8 @@ fn folders(output: &Path, scenes: &[SceneSource]) -> Result<Vec<PathBuf>, AppErr
     }
     let folders: Vec<PathBuf> = names.iter().map(|name| output.join(name)).collect();
     for folder in &folders {
-        std::fs::create_dir_all(folder).map_err(|source| write::FileError::new("make the folder", folder, source))?;
+        crate::files::create_dir_all(folder)
+            .map_err(|source| write::FileError::new("make the folder", folder, source))?;
     }
     Ok(folders)
 }

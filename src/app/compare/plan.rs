@@ -161,6 +161,7 @@ impl Plan<'_> {
         let own = self.global.clone();
         let global = Global {
             validate: own.validate || cli.global.validate,
+            max_memory: cli.global.max_memory.or(own.max_memory),
             gpu_timeout: cli.global.gpu_timeout.or(own.gpu_timeout),
             crash_file: cli.global.crash_file.or(own.crash_file),
             lose_device_at: cli.global.lose_device_at.or(own.lose_device_at),
@@ -221,6 +222,7 @@ mod tests {
     const GLOBAL: Global = Global {
         gpu: None,
         validate: false,
+        max_memory: None,
         gpu_timeout: None,
         crash_file: None,
         lose_device_at: None,

@@ -127,7 +127,7 @@ fn hash(run: &Run) -> Result<String, AppError> {
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
     hasher.update(Value::from(record).to_string().as_bytes());
     if let Some(EnvironmentSource::File(path)) = &run.request.environment {
-        hasher.update(&std::fs::read(path).unwrap_or_default());
+        hasher.update(&crate::files::read(path).unwrap_or_default());
     }
     hasher.update(run.request.scene.hash().as_bytes());
     Ok(hasher.finalize().to_hex().to_string())

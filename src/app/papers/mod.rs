@@ -59,7 +59,8 @@ pub fn run(
             "no row is left; --only looks for its text in places such as \"Table 1\", in what is measured and on what";
         return Err(AppError::Usage(message.into()));
     }
-    std::fs::create_dir_all(&args.output).map_err(|source| FileError::new("make the folder", &args.output, source))?;
+    crate::files::create_dir_all(&args.output)
+        .map_err(|source| FileError::new("make the folder", &args.output, source))?;
     let device = device_facts::device(render::open_device(global, false)?.info());
     let program = concat!("linklight ", env!("CARGO_PKG_VERSION"));
     let mut report = Report { schema: SCHEMA, version: VERSION, program, device, rows: Vec::new() };
@@ -70,7 +71,7 @@ pub fn run(
         measured: HashMap::new(),
         folder: args.output.join("runs"),
     };
-    std::fs::create_dir_all(&evidence.folder)
+    crate::files::create_dir_all(&evidence.folder)
         .map_err(|source| FileError::new("make the folder", &evidence.folder, source))?;
     for row in &rows {
         let row = evidence.row(row)?;
@@ -260,6 +261,7 @@ mod tests {
     const GLOBAL: Global = Global {
         gpu: None,
         validate: false,
+        max_memory: None,
         gpu_timeout: None,
         crash_file: None,
         lose_device_at: None,

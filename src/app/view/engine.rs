@@ -208,7 +208,7 @@ impl<'c> Engine<'c> {
             let mut scene = match self.scene.take() {
                 Some(scene) => scene,
                 None => {
-                    let scene = load_scene(&request.scene)?;
+                    let scene = load_scene(&request.scene, self.context)?;
                     self.originals = Some(Originals::of(&scene));
                     scene
                 }

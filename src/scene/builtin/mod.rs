@@ -58,7 +58,7 @@ pub enum BuiltinError {
     ClosedRoomsParameters { parameters: String },
     #[error(
         "built-in scene 'gallery' with {triangles} triangles needs {needed} bytes to be made, more than the {allowed} \
-         allowed; ask for fewer triangles or allow more memory"
+         allowed; ask for fewer triangles or raise --max-memory"
     )]
     GalleryMemory { triangles: u32, needed: u64, allowed: u64 },
 }

@@ -1,7 +1,6 @@
 //! Reads `.hdr` (Radiance) and `.exr` files as environments: sizes are checked from the header before anything is
 //! decoded, and texels that are no radiance are repaired and counted.
 
-use std::fs::File;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -13,6 +12,7 @@ use image::codecs::hdr::HdrDecoder;
 use thiserror::Error;
 
 use super::{Environment, EnvironmentMap};
+use crate::files::File;
 
 /// What a map may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +46,7 @@ pub enum EnvironmentError {
     )]
     Extent { path: PathBuf, width: u64, height: u64, allowed: u32 },
     #[error(
-        "environment {}: {needed} bytes needed, {available} allowed; resize the picture or raise max_memory_bytes",
+        "environment {}: {needed} bytes needed, {available} allowed; resize the picture or raise --max-memory",
         path.display()
     )]
     OutOfMemory { path: PathBuf, needed: u64, available: u64 },
@@ -99,14 +99,23 @@ pub fn load(
         }
         EnvironmentSource::File(path) => path,
     };
-    let bytes = read_file(path, limits)?;
+    load_bytes(path, &read_file(path, limits)?, rotation, limits)
+}
+
+/// As [`load`], of a file's content; `path` names it in messages.
+pub fn load_bytes(
+    path: &Path,
+    bytes: &[u8],
+    rotation: f32,
+    limits: &EnvironmentLimits,
+) -> Result<LoadedEnvironment, EnvironmentError> {
     let mut notes = Vec::new();
     let (width, height, mut texels) = if bytes.starts_with(b"#?") {
-        decode_hdr(path, &bytes, limits, &mut notes)?
+        decode_hdr(path, bytes, limits, &mut notes)?
     } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
-        decode_exr(path, &bytes, limits)?
+        decode_exr(path, bytes, limits)?
     } else {
-        return Err(EnvironmentError::UnknownFormat { path: path.clone() });
+        return Err(EnvironmentError::UnknownFormat { path: path.into() });
     };
     notes.extend(repair(path, &mut texels));
     let rotation = if rotation.is_finite() { rotation } else { 0.0 };

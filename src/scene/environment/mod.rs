@@ -50,6 +50,14 @@ impl Environment {
         }
     }
 
+    /// Bytes of its table.
+    pub fn size_bytes(&self) -> u64 {
+        match self {
+            Self::Constant(_) => 0,
+            Self::Map(map) => size_of_val(map.texels.as_slice()) as u64,
+        }
+    }
+
     /// Whether no light comes from any direction.
     pub fn is_black(&self) -> bool {
         match self {

@@ -45,7 +45,7 @@ pub enum Fault {
     RefusedUri { pointer: String, uri: String, rule: &'static str },
 
     #[error(
-        "{what}: {needed} bytes are needed and {available} are available of the scene's memory budget; raise the budget or simplify the scene"
+        "{what}: {needed} bytes are needed and {available} are available of the scene's memory budget; raise it (--max-memory) or simplify the scene"
     )]
     OverBudget { what: String, needed: u64, available: u64 },
 

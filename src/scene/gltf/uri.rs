@@ -2,11 +2,11 @@
 
 use super::budget::Budget;
 use super::error::{Fault, shown};
+use crate::files::{self, File};
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use percent_encoding::percent_decode_str;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
@@ -71,7 +71,7 @@ fn relative_path(uri: &str) -> Result<PathBuf, &'static str> {
 pub fn read_file(path: &Path, budget: &Budget) -> Result<Vec<u8>, Fault> {
     let what = || shown(&path.to_string_lossy());
     let unreadable = |reason: String| Fault::Unreadable { what: what(), reason };
-    let metadata = std::fs::metadata(path).map_err(|error| unreadable(error.to_string()))?;
+    let metadata = files::metadata(path).map_err(|error| unreadable(error.to_string()))?;
     if !metadata.is_file() {
         return Err(unreadable("it is not a plain file".into()));
     }

@@ -4,7 +4,8 @@
 //! or cannot be read is as good as not there: the tree is built again. Files not used for longest make room for new ones
 //! ([`kept`]).
 
-use super::{ClusterTree, MeshFaces};
+use super::{ClusterTree, MAX_DEPTH, MeshFaces, face_count};
+use crate::files;
 use crate::gpu::shaders::types::FaceCluster;
 use crate::stages::kept;
 use std::io::Write;
@@ -41,7 +42,7 @@ pub fn tree(mesh: &MeshFaces<'_>, folder: Option<&Path>) -> ClusterTree {
         return ClusterTree::build(mesh);
     };
     let path = path_of(folder, mesh);
-    if let Some(tree) = std::fs::read(&path).ok().and_then(|bytes| decode(&bytes, mesh.triangles.len())) {
+    if let Some(tree) = files::read(&path).ok().and_then(|bytes| decode(&bytes, mesh.triangles.len())) {
         kept::used(&path);
         return tree;
     }
@@ -58,15 +59,16 @@ pub fn path_of(folder: &Path, mesh: &MeshFaces<'_>) -> PathBuf {
 }
 
 fn write(folder: &Path, path: &Path, tree: &ClusterTree) -> std::io::Result<()> {
-    std::fs::create_dir_all(folder)?;
-    let mut file = tempfile::NamedTempFile::new_in(folder)?;
-    file.write_all(&encode(tree))?;
-    file.persist(path)?;
+    files::create_dir_all(folder)?;
+    let mut part = files::Part::create(&tempfile::Builder::new(), path)?;
+    part.write_all(&encode(tree))?;
+    part.finish()?;
     kept::make_room(folder, ["", ".clusters"], path, kept::MOST_BYTES);
     Ok(())
 }
 
-fn encode(tree: &ClusterTree) -> Vec<u8> {
+/// The content of a file.
+pub fn encode(tree: &ClusterTree) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + tree.size_bytes() as usize + HASH);
     bytes.extend(MAGIC);
     for number in [VERSION, tree.depth, tree.clusters.len() as u32, tree.faces.len() as u32] {
@@ -79,8 +81,8 @@ fn encode(tree: &ClusterTree) -> Vec<u8> {
     bytes
 }
 
-/// `None` for anything but a whole tree of `face_count` faces.
-fn decode(bytes: &[u8], face_count: usize) -> Option<ClusterTree> {
+/// `None` for anything but a whole and sound tree of `face_count` faces.
+pub fn decode(bytes: &[u8], face_count: usize) -> Option<ClusterTree> {
     let (body, hash) = bytes.split_last_chunk::<HASH>()?;
     let (magic, rest) = body.split_first_chunk::<8>()?;
     if *magic != MAGIC || blake3::hash(body).as_bytes() != hash || rest.len() < HEADER - 8 {
@@ -92,14 +94,42 @@ fn decode(bytes: &[u8], face_count: usize) -> Option<ClusterTree> {
     let cluster_bytes = clusters.checked_mul(size_of::<FaceCluster>())?;
     let is_whole = version == VERSION
         && faces == face_count
-        && clusters == 2 * faces - 1
+        && faces > 0
+        && clusters == faces.checked_mul(2)? - 1
         && tables.len() == cluster_bytes + faces.checked_mul(4)?;
-    is_whole.then(|| {
-        let (clusters, faces) = tables.split_at(cluster_bytes);
-        ClusterTree {
-            clusters: bytemuck::pod_collect_to_vec(clusters),
-            faces: bytemuck::pod_collect_to_vec(faces),
-            depth,
+    if !is_whole {
+        return None;
+    }
+    let (clusters, faces) = tables.split_at(cluster_bytes);
+    let tree = ClusterTree {
+        clusters: bytemuck::pod_collect_to_vec(clusters),
+        faces: bytemuck::pod_collect_to_vec(faces),
+        depth,
+    };
+    is_sound(&tree).then_some(tree)
+}
+
+/// What walks trust: the faces of a cluster are those of its two children, no deeper than stated, each face once.
+fn is_sound(tree: &ClusterTree) -> bool {
+    // A cluster with the levels above it, its first face and number of faces, as its parent has it.
+    let mut expected = vec![(0, 0, 0, tree.faces.len() as u32)];
+    let mut next = 0;
+    while let Some((cluster, level, first, count)) = expected.pop() {
+        let here = &tree.clusters[cluster as usize];
+        if cluster != next || (here.first_face, face_count(here)) != (first, count) || level > tree.depth.min(MAX_DEPTH)
+        {
+            return false;
         }
-    })
+        next += 1;
+        if count > 1 {
+            let left = tree.clusters.get(cluster as usize + 1).map_or(0, face_count);
+            if left == 0 || left >= count {
+                return false;
+            }
+            expected.push((cluster + 2 * left, level + 1, first + left, count - left));
+            expected.push((cluster + 1, level + 1, first, left));
+        }
+    }
+    let mut is_there = vec![false; tree.faces.len()];
+    tree.faces.iter().all(|face| is_there.get_mut(*face as usize).is_some_and(|there| !std::mem::replace(there, true)))
 }

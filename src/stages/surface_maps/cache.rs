@@ -1,6 +1,7 @@
 //! Compressed maps on disk: under a hash of all that went into them, whole or not at all, checked when read.
 
 use super::compress::{CompressedMaps, Run};
+use crate::files;
 use crate::report::write::{FileError, write_whole};
 use crate::stages::kept;
 use std::io::Write as _;
@@ -42,7 +43,7 @@ pub enum Found {
 /// Reads the maps of `key`, checked against their checksum and for sense.
 pub fn read(folder: &Path, key: &Key) -> Found {
     let path = key.file_in(folder);
-    let Ok(bytes) = std::fs::read(&path) else { return Found::Nothing };
+    let Ok(bytes) = files::read(&path) else { return Found::Nothing };
     match decode(&bytes, key) {
         Ok(maps) => {
             kept::used(&path);
@@ -54,7 +55,7 @@ pub fn read(folder: &Path, key: &Key) -> Found {
 
 /// Writes the maps of `key`; a reader finds all of them or none. Files not used for longest make room.
 pub fn write(folder: &Path, key: &Key, maps: &CompressedMaps) -> Result<(), FileError> {
-    std::fs::create_dir_all(folder).map_err(|source| FileError::new("make the folder", folder, source))?;
+    files::create_dir_all(folder).map_err(|source| FileError::new("make the folder", folder, source))?;
     let path = key.file_in(folder);
     let body = encode(key, maps);
     write_whole(&path, |writer| writer.write_all(&body).map_err(|source| FileError::new("write", &path, source)))?;
@@ -106,9 +107,24 @@ fn decode(file: &[u8], key: &Key) -> Result<CompressedMaps, &'static str> {
     let mut words = rest.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let offsets: Vec<u32> = words.by_ref().take(offset_count).collect();
     let runs: Vec<Run> = words.map(|word| Run { depth: word as u16, first: (word >> 16) as u16 }).collect();
-    let rises = offsets.windows(2).all(|pair| pair[0] <= pair[1]) && offsets.last() == Some(&(runs.len() as u32));
     let place_count = u32::try_from(place_count).map_err(|_| "its counts are wrong")?;
-    if rises { Ok(CompressedMaps { offsets, runs, place_count }) } else { Err("its runs are out of order") }
+    let maps = CompressedMaps { offsets, runs, place_count };
+    if is_sound(&maps) { Ok(maps) } else { Err("its runs are out of order") }
+}
+
+/// What look-ups trust: every pixel has runs, the first of them from the first place on, the others later and later.
+fn is_sound(maps: &CompressedMaps) -> bool {
+    let whole = maps.offsets.first() == Some(&0) && maps.offsets.last() == Some(&(maps.runs.len() as u32));
+    whole
+        && maps.offsets.windows(2).all(|pair| {
+            let Some(runs) = maps.runs.get(pair[0] as usize..pair[1] as usize) else { return false };
+            let rises = runs.windows(2).all(|pair| pair[0].first < pair[1].first);
+            let covers = match (runs.first(), runs.last()) {
+                (Some(first), Some(last)) => first.first == 0 && u32::from(last.first) < maps.place_count,
+                _ => maps.place_count == 0,
+            };
+            rises && covers
+        })
 }
 
 #[cfg(test)]
@@ -116,7 +132,7 @@ mod tests {
     use super::*;
 
     fn maps() -> CompressedMaps {
-        let runs = (0..9).map(|i| Run { depth: 1000 * i, first: i }).collect();
+        let runs = (0..9).map(|i| Run { depth: 1000 * i, first: if i < 4 { i } else { i - 4 } }).collect();
         CompressedMaps { offsets: vec![0, 4, 9], runs, place_count: 12 }
     }
 

@@ -17,7 +17,7 @@
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
-mod cache;
+pub mod cache;
 mod compress;
 mod outside;
 mod placed;
@@ -162,8 +162,9 @@ impl SurfaceMaps {
         parts.extend(input.content);
         let key = Key::over(&parts);
         let mut ray_count = 0;
+        let counts = (origins.len(), 6 * (options.resolution as usize).pow(2));
         let maps = match input.cache.map(|folder| cache::read(folder, &key)) {
-            Some(Found::Maps(maps)) if maps.place_count as usize == origins.len() => maps,
+            Some(Found::Maps(maps)) if (maps.place_count as usize, maps.pixel_count()) == counts => maps,
             found => {
                 if let (Some(Found::Damaged(reason)), Some(folder)) = (&found, input.cache) {
                     tracing::warn!("{} is damaged ({reason}); made anew", key.file_in(folder).display());

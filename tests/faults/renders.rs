@@ -1,0 +1,151 @@
+//! Whole renders by each method, in which one Vulkan call or one access to a file fails.
+
+use crate::{TURN, is_apart, sample};
+use clap::Parser as _;
+use linklight::app::{self, AppError, cli::Cli};
+use linklight::files::{FileFaults, PLANTED};
+use linklight::gpu::{Failure, FaultInjection};
+use linklight::methods::METHODS;
+use linklight::report::image;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// A render takes well below a second; one that waits for what never comes takes ten minutes.
+const MAX_TIME: Duration = Duration::from_secs(120);
+
+fn render(method: &str, options: &[&str]) -> Result<(), AppError> {
+    let small = ["--size", "12x8", "--bounces", "1", "--spp", "1", "--quiet"];
+    let words = ["linklight", "render", "builtin:furnace", "--method", method].into_iter().chain(small);
+    let cli = Cli::try_parse_from(words.chain(options.iter().copied())).unwrap_or_else(|error| panic!("{error}"));
+    let start = Instant::now();
+    let result = app::run(cli, &mut Vec::new());
+    assert!(start.elapsed() < MAX_TIME, "{:?}", start.elapsed());
+    result
+}
+
+fn pixels(path: &Path) -> Vec<glam::Vec3> {
+    image::read(path).unwrap_or_else(|error| panic!("{error}")).rgb
+}
+
+/// Names of the files in a folder.
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Elements enough for a few, where the method takes a number.
+fn elements(method: &str) -> &'static [&'static str] {
+    match method {
+        "surface-shadow-maps" => &["--set", "map_resolution=8"],
+        "path-tracing" | "face-cluster" => &[],
+        _ => &["--elements", "60"],
+    }
+}
+
+#[test]
+fn renders_survive_vulkan_calls_that_fail() {
+    if !is_apart("renders::renders_survive_vulkan_calls_that_fail") {
+        return;
+    }
+    let _turn = TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.exr");
+    let path = output.to_str().unwrap();
+    let faults = FaultInjection::start();
+    for method in METHODS {
+        let options = [&["--validate", "-o", path], elements(method.key)].concat();
+        // Twice: the first fills the caches.
+        render(method.key, &options).unwrap_or_else(|error| panic!("{}: {error}", method.key));
+        faults.fail(0, Failure::OutOfHostMemory);
+        render(method.key, &options).unwrap_or_else(|error| panic!("{}: {error}", method.key));
+        let (calls, whole) = (faults.calls(), pixels(&output));
+        assert_eq!(faults.complaints(), Vec::<String>::new(), "{}", method.key);
+        let chosen = sample(&calls, 3);
+        let start = Instant::now();
+        for &at in &chosen {
+            std::fs::remove_file(&output).unwrap();
+            faults.fail(at, Failure::OutOfHostMemory);
+            let result = render(method.key, &options);
+            let name = faults.failed().unwrap_or("none");
+            let what = format!("{}, call {at} ({name})", method.key);
+            match result {
+                Ok(()) => assert!(pixels(&output) == whole, "{what}: another picture"),
+                Err(error) => {
+                    let message = error.to_string();
+                    let no_device = ["vkEnumerateDeviceExtensionProperties"].contains(&name);
+                    assert_eq!(error.exit_code(), if no_device { 3 } else { 1 }, "{what}: {message}");
+                    assert!(message.contains("memory") || message.contains("MEMORY"), "{what}: {message}");
+                    assert_eq!(names(folder.path()), Vec::<String>::new(), "{what}: something is left");
+                    std::fs::write(&output, "").unwrap();
+                }
+            }
+            assert_eq!(faults.complaints(), Vec::<String>::new(), "{what}");
+        }
+        println!("  {:<20} {} of {} calls failed, {:.1?}", method.key, chosen.len(), calls.len(), start.elapsed());
+    }
+}
+
+/// Outputs of every kind, a scene and an environment from files, and the caches.
+#[test]
+fn renders_survive_files_that_fail() {
+    if !is_apart("renders::renders_survive_files_that_fail") {
+        return;
+    }
+    let _turn = TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let (inputs, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let environment = inputs.path().join("sky.exr");
+    let sky = image::Picture::new(4, 2, vec![glam::Vec3::ONE; 8]).unwrap();
+    image::write_exr(&environment, &sky).unwrap();
+    let outputs: Vec<PathBuf> =
+        ["out.png", "profile.json", "out.trace.json", "hashes.json"].map(|name| folder.path().join(name)).to_vec();
+    let out: Vec<&str> = outputs.iter().map(|path| path.to_str().unwrap()).collect();
+    let faults = FileFaults::start();
+    for method in ["explicit-visibility", "surface-shadow-maps", "face-cluster"] {
+        let env = environment.to_str().unwrap();
+        let files = ["-o", out[0], "--profile", out[1], "--trace", out[2], "--hashes", out[3], "--env", env];
+        let options = [&files[..], elements(method)].concat();
+        faults.fail(0);
+        render(method, &options).unwrap();
+        faults.fail(0);
+        render(method, &options).unwrap();
+        let (count, whole) = (faults.count(), std::fs::read(&outputs[0]).unwrap());
+        assert!(count > 15, "{count}");
+        let mut refused = 0;
+        for at in (1..=count).step_by(if count > 60 { count as usize / 20 } else { 2 }) {
+            outputs.iter().for_each(|path| drop(std::fs::remove_file(path)));
+            faults.fail(at);
+            let result = render(method, &options);
+            let failed = faults.failed().unwrap_or_default();
+            match result {
+                // A cache that cannot be read or written costs time alone.
+                Ok(()) => assert!(std::fs::read(&outputs[0]).unwrap() == whole, "{method}, {failed}: another picture"),
+                Err(error) => {
+                    assert_eq!(error.exit_code(), 1, "{method}, {failed}: {error}");
+                    assert!(error.to_string().contains(PLANTED), "{method}, {failed}: {error}");
+                    refused += 1;
+                }
+            }
+            for path in &outputs {
+                // Whole or not there: JSON ends, pictures open.
+                match std::fs::read(path) {
+                    Ok(bytes) if path.extension().is_some_and(|extension| extension == "json") => {
+                        assert!(serde_json::from_slice::<serde_json::Value>(&bytes).is_ok(), "{method}, {failed}");
+                    }
+                    Ok(_) => drop(pixels(path)),
+                    Err(_) => {}
+                }
+            }
+            let left = names(folder.path());
+            assert!(
+                left.iter().all(|name| out.iter().any(|path| path.ends_with(name))),
+                "{method}, {failed}: {left:?}"
+            );
+        }
+        println!("  {method:<20} {count} accesses to files, {refused} failures refused");
+        assert!(refused > 5, "{method}: {refused} of {count} failures were noticed");
+    }
+}
