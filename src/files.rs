@@ -72,6 +72,12 @@ fn access(action: &str, path: &Path) -> io::Result<()> {
     Err(io::Error::other(PLANTED))
 }
 
+/// Runs a decoder of another crate. One that panics on damaged data (on this thread) is one that refuses it.
+pub fn decode<T>(decoder: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    let broken = |_| Err("its decoder broke off; the file is damaged, write it again".to_owned());
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(decoder)).unwrap_or_else(broken)
+}
+
 pub fn metadata(path: &Path) -> io::Result<fs::Metadata> {
     access("look at", path)?;
     fs::metadata(path)

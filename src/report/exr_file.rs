@@ -17,7 +17,7 @@ use glam::Vec3;
 
 use super::image::{Channel, Metadata, Picture, PictureError, check_length, check_size};
 use super::write::{FileError, write_whole};
-use crate::files::File;
+use crate::files::{File, decode};
 
 const METADATA_ATTRIBUTE: &str = "linklight";
 /// Most channels of the largest picture that is read; ours have up to 16.
@@ -62,8 +62,9 @@ pub(super) fn read(path: &Path, max_pixels: u64) -> Result<Picture, PictureError
     let open = || File::open(path).map_err(|source| FileError::new("open", path, source));
 
     // Sizes first: nothing is allocated for a file that only claims to be large.
+    let file = BufReader::new(open()?);
     let headers =
-        MetaData::read_from_buffered(BufReader::new(open()?), false).map_err(|error| fail(error.to_string()))?;
+        decode(|| MetaData::read_from_buffered(file, false).map_err(|error| error.to_string())).map_err(fail)?;
     let mut samples: u64 = 0;
     for header in &headers.headers {
         let [width, height] = [header.layer_size.width(), header.layer_size.height()].map(|side| side as u64);
@@ -78,14 +79,20 @@ pub(super) fn read(path: &Path, max_pixels: u64) -> Result<Picture, PictureError
         )));
     }
 
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_buffered(BufReader::new(open()?))
-        .map_err(|error| fail(error.to_string()))?;
+    let file = BufReader::new(open()?);
+    let image = decode(|| {
+        exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            // On threads of its own a panic would end the process.
+            .non_parallel()
+            .from_buffered(file)
+            .map_err(|error| error.to_string())
+    })
+    .map_err(fail)?;
 
     let has_rgb = |list: &[AnyChannel<FlatSamples>]| {
         ["R", "G", "B"].iter().all(|name| list.iter().any(|channel| channel.name == **name))

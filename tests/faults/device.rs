@@ -86,7 +86,7 @@ fn a_planted_leak_is_seen() {
     std::mem::forget(recorder);
     drop(context);
     let complaints = faults.complaints();
-    assert!(complaints.iter().any(|complaint| complaint.contains("has not been destroyed")), "{complaints:?}");
+    assert!(complaints.iter().any(|complaint| complaint.contains("have not been destroyed")), "{complaints:?}");
 }
 
 #[test]

@@ -195,7 +195,7 @@ fn read_surface_maps(input: &[u8], folder: &Path) {
     for place in
         [0, maps.place_count / 2, maps.place_count.saturating_sub(1)].into_iter().filter(|p| *p < maps.place_count)
     {
-        (0..maps.pixel_count()).for_each(|pixel| drop(maps.depth(place, pixel)));
+        (0..maps.pixel_count()).for_each(|pixel| _ = maps.depth(place, pixel));
     }
 }
 

@@ -1,8 +1,8 @@
 //! Scenes: .glb and .gltf, bent in the JSON or in the data, and what the renderer makes of a scene on the host.
 
 use crate::Target;
-use crate::conformance::assert_sound;
 use crate::mutate::{self, Random};
+use crate::sound::assert_sound;
 use crate::support::{everything, glb, png, triangle};
 use base64::Engine as _;
 use glam::UVec2;
@@ -15,8 +15,7 @@ use linklight::stages::clusters::{ClusterTree, MeshFaces};
 use serde_json::Value;
 use std::path::Path;
 
-pub const GLTF: Target =
-    Target { name: "gltf", runs: 2_000, seeds, mutate: bend, read, max_bytes: 6 * BUDGET as usize };
+pub const GLTF: Target = Target { name: "gltf", runs: 500, seeds, mutate: bend, read, max_bytes: 6 * BUDGET as usize };
 
 /// Of each step.
 const BUDGET: u64 = 32 << 20;

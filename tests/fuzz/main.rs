@@ -15,9 +15,8 @@ mod gltf_inputs;
 mod mutate;
 mod words;
 
-#[path = "../gltf/conformance.rs"]
-#[allow(dead_code, reason = "soundness alone is looked at here")]
-mod conformance;
+#[path = "../gltf/sound.rs"]
+mod sound;
 #[path = "../gltf/support.rs"]
 #[allow(dead_code, reason = "each test file uses its own part")]
 mod support;

@@ -77,7 +77,7 @@ const WORDS: [&str; 48] = [
 ];
 
 fn bend(random: &mut Random, seeds: &[Vec<u8>]) -> Vec<u8> {
-    let seed = String::from_utf8_lossy(random.pick(seeds)).into_owned();
+    let seed = String::from_utf8_lossy(random.pick::<Vec<u8>>(seeds)).into_owned();
     mutate::text(random, &seed, &WORDS)
 }
 
@@ -185,9 +185,8 @@ fn read_state(input: &[u8], folder: &Path) {
 
 pub fn seeds_are_valid() {
     for seed in command_lines() {
-        let words =
-            std::iter::once("linklight".to_owned()).chain(String::from_utf8(seed).unwrap().lines().map(Into::into));
-        let words: Vec<OsString> = words.map(OsString::from).collect();
+        let text = String::from_utf8(seed).unwrap();
+        let words: Vec<OsString> = std::iter::once("linklight").chain(text.lines()).map(OsString::from).collect();
         Cli::try_parse_from(words.clone()).unwrap_or_else(|error| panic!("{error}"));
         check(words).unwrap_or_else(|error| panic!("{error}"));
     }

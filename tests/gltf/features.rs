@@ -1,6 +1,6 @@
 //! Each feature of the format, read from a small file of its own, gives the values it should.
 
-use crate::conformance::assert_sound;
+use crate::sound::assert_sound;
 use crate::support::{Builder, everything, png, shared, triangle};
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use linklight::scene::{self, Interpolation, LightKind, LoadOptions, Projection, Scene, SceneChoice, Track, Transform};

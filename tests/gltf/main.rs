@@ -5,4 +5,5 @@ mod conformance;
 mod features;
 mod mutated;
 mod shared_bad;
+mod sound;
 mod support;

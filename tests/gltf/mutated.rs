@@ -1,7 +1,7 @@
 //! A file that uses every feature, bent in one to three places at a time: whatever comes out, nothing panics, runs on
 //! or breaks what a loaded scene promises.
 
-use crate::conformance::assert_sound;
+use crate::sound::assert_sound;
 use crate::support::{everything, glb};
 use linklight::scene::{self, LoadOptions};
 use proptest::prelude::*;

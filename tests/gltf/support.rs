@@ -265,7 +265,14 @@ pub fn png(width: u32, height: u32) -> Vec<u8> {
 pub fn verdict(result: &Result<Scene, SceneError>) -> String {
     match result.as_ref().map_err(|error| &error.fault) {
         Ok(scene) if scene.notes.is_empty() => "accept".into(),
-        Ok(scene) => format!("note: {}", scene.notes.join(" | ").replace(['\t', '\n'], " ")),
+        Ok(scene) => {
+            // Files of a scene are told apart by their names, wherever the scene is.
+            let notes = scene.notes.join(" | ").replace(['\t', '\n'], " ");
+            let parts = notes
+                .split('"')
+                .map(|part| if part.starts_with('/') { part.rsplit('/').next().unwrap_or(part) } else { part });
+            format!("note: {}", parts.collect::<Vec<_>>().join("\""))
+        }
         Err(fault) => format!("reject {}", rule(fault)),
     }
 }
@@ -284,9 +291,11 @@ pub fn rule(fault: &Fault) -> String {
     }
 }
 
-/// Adds nodes for every mesh (with every material), camera, light and skin, and makes one scene of all root nodes.
+/// Adds nodes for every mesh (with every material), camera, light and skin, and makes one scene of all root nodes. What
+/// no mesh or material uses is given one: accessors, or else buffer views, or else buffers; textures, or else images.
 pub fn show_everything(document: &mut Value) {
     let count = |list: &Value| list.as_array().map_or(0, Vec::len);
+    use_everything(document);
     let lights = count(&document["extensions"]["KHR_lights_punctual"]["lights"]);
     let (meshes, cameras, skins) = (count(&document["meshes"]), count(&document["cameras"]), count(&document["skins"]));
     let materials = count(&document["materials"]);
@@ -326,6 +335,53 @@ pub fn show_everything(document: &mut Value) {
         document["scenes"] = json!([{ "nodes": roots }]);
         if let Some(root) = document.as_object_mut() {
             root.remove("scene");
+        }
+    }
+}
+
+/// Meshes and materials of what nothing uses.
+fn use_everything(document: &mut Value) {
+    let count = |list: &Value| list.as_array().map_or(0, Vec::len);
+    let names = ["meshes", "accessors", "bufferViews", "buffers", "materials", "textures", "images", "samplers"];
+    let [meshes, mut accessors, mut views, buffers, materials, mut textures, images, samplers] =
+        names.map(|name| count(&document[name]));
+    let kind = |accessor: &Value| accessor["type"].as_str().unwrap_or_default().to_owned();
+    let kinds: Vec<String> = document["accessors"].as_array().into_iter().flatten().map(kind).collect();
+    let Some(root) = document.as_object_mut() else { return };
+    let is_moving = ["animations", "skins"].iter().any(|name| root.contains_key(*name));
+    let mut push = |list: &str, value: Value| {
+        if let Some(list) = root.entry(list).or_insert_with(|| json!([])).as_array_mut() {
+            list.push(value);
+        }
+    };
+    if meshes == 0 && !is_moving {
+        if accessors == 0 && views == 0 {
+            (0..buffers).for_each(|buffer| push("bufferViews", json!({ "buffer": buffer, "byteLength": 36 })));
+            views = buffers;
+        }
+        if accessors == 0 {
+            let accessor =
+                |view: usize| json!({ "bufferView": view, "componentType": 5126, "type": "VEC3", "count": 3 });
+            (0..views).for_each(|view| push("accessors", accessor(view)));
+            accessors = views;
+        }
+        // Of other shapes than positions have, nothing would be looked at but that.
+        let others = ["SCALAR", "VEC2", "VEC4", "MAT2", "MAT3", "MAT4"];
+        for accessor in
+            (0..accessors).filter(|index| kinds.get(*index).is_none_or(|kind| !others.contains(&kind.as_str())))
+        {
+            let primitive = json!({ "attributes": { "POSITION": accessor } });
+            push("meshes", json!({ "primitives": [primitive] }));
+        }
+    }
+    if materials == 0 {
+        if textures == 0 {
+            (0..images).for_each(|image| push("textures", json!({ "source": image })));
+            (0..samplers).for_each(|sampler| push("textures", json!({ "sampler": sampler })));
+            textures = images + samplers;
+        }
+        for texture in 0..textures {
+            push("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": texture } } }));
         }
     }
 }

@@ -12,7 +12,7 @@ use image::codecs::hdr::HdrDecoder;
 use thiserror::Error;
 
 use super::{Environment, EnvironmentMap};
-use crate::files::File;
+use crate::files::{File, decode};
 
 /// What a map may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -189,24 +189,30 @@ fn decode_hdr(
 }
 
 fn decode_exr(path: &Path, bytes: &[u8], limits: &EnvironmentLimits) -> Result<Decoded, EnvironmentError> {
-    let failed = |error: exr::error::Error| EnvironmentError::Decode { path: path.into(), message: error.to_string() };
-    let metadata = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(failed)?;
+    let failed = |message: String| EnvironmentError::Decode { path: path.into(), message };
+    let read = || exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| error.to_string());
+    let metadata = decode(read).map_err(failed)?;
     for header in &metadata.headers {
         check_size(path, [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64), bytes.len(), limits)?;
     }
-    let image = exr::image::read::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| (size.x(), vec![Vec3::ZERO; size.x() * size.y()]),
-            |(width, texels): &mut (usize, Vec<Vec3>), at, (r, g, b): (f32, f32, f32)| {
-                texels[at.y() * *width + at.x()] = Vec3::new(r, g, b);
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(failed)?;
+    let image = decode(|| {
+        exr::image::read::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .rgb_channels(
+                |size, _| (size.x(), vec![Vec3::ZERO; size.x() * size.y()]),
+                |(width, texels): &mut (usize, Vec<Vec3>), at, (r, g, b): (f32, f32, f32)| {
+                    texels[at.y() * *width + at.x()] = Vec3::new(r, g, b);
+                },
+            )
+            .first_valid_layer()
+            .all_attributes()
+            // On threads of its own a panic would end the process.
+            .non_parallel()
+            .from_buffered(Cursor::new(bytes))
+            .map_err(|error| error.to_string())
+    })
+    .map_err(failed)?;
     let size = image.layer_data.size;
     Ok((size.x() as u32, size.y() as u32, image.layer_data.channel_data.pixels.1))
 }
