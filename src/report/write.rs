@@ -67,6 +67,7 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
     match files::metadata(folder) {
         Ok(metadata) if metadata.is_dir() => Ok(()),
         Ok(_) => Err(fail(io::Error::new(io::ErrorKind::NotADirectory, "its parent is not a folder"))),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(fail(error)),
         Err(_) => Err(fail(io::Error::new(
             io::ErrorKind::NotFound,
             format!("the folder {} does not exist; create it first", folder.display()),
