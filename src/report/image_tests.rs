@@ -71,7 +71,7 @@ fn png_keeps_bytes_and_text() {
 fn hdr_files_are_linear_radiance() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.hdr");
-    let file = File::create(&path).unwrap();
+    let file = std::fs::File::create(&path).unwrap();
     let pixels = [::image::Rgb([1.0f32, 2.0, 4.0]), ::image::Rgb([0.25, 0.5, 0.125])];
     ::image::codecs::hdr::HdrEncoder::new(file).encode(&pixels, 2, 1).unwrap();
     let read = read(&path).unwrap();
@@ -119,7 +119,7 @@ fn damaged_files_never_panic() {
     write_png(&png, 8, 8, &[77; 192], &picture.metadata).unwrap();
     let hdr = folder.path().join("a.hdr");
     let pixels = vec![::image::Rgb([1.0f32, 2.0, 4.0]); 64];
-    ::image::codecs::hdr::HdrEncoder::new(File::create(&hdr).unwrap()).encode(&pixels, 8, 8).unwrap();
+    ::image::codecs::hdr::HdrEncoder::new(std::fs::File::create(&hdr).unwrap()).encode(&pixels, 8, 8).unwrap();
 
     let damaged = folder.path().join("damaged");
     let mut refused = 0;
