@@ -317,3 +317,7 @@ impl<'c> Engine<'c> {
 #[cfg(test)]
 #[path = "engine_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "soak_tests.rs"]
+mod soak_tests;

@@ -12,7 +12,7 @@ use crate::stages::work::Unwatched;
 /// Where a test says nothing else.
 const PICTURE: [(&str, &str); 4] = [("--size", "30x20"), ("--elements", "400"), ("--bounces", "1"), ("--spp", "1")];
 
-fn context() -> Context {
+pub(super) fn context() -> Context {
     Context::new(Options { validation: true, ..Options::default() }).unwrap()
 }
 
@@ -25,7 +25,7 @@ fn request(options: &str) -> RenderRequest {
     RenderRequest::of_picture(&args.picture, Output { path: "a.png".into(), format: Format::Png }).unwrap()
 }
 
-fn pixels(context: &Context, engine: &mut Engine<'_>, options: &str) -> Vec<Vec3> {
+pub(super) fn pixels(context: &Context, engine: &mut Engine<'_>, options: &str) -> Vec<Vec3> {
     let film = engine.render(&request(options), &Unwatched).unwrap();
     let mut pixels = context.download(&film.direct).unwrap();
     pixels.extend(context.download(&film.indirect).unwrap());
