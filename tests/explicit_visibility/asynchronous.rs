@@ -22,7 +22,7 @@ fn pose(context: &TestContext, fixture: &Fixture, seconds: f32) {
 fn state(context: &TestContext, method: &ExplicitVisibility) -> (Vec<u64>, Vec<u32>, Vec<u32>, Vec<u32>) {
     let links = method.links();
     let words =
-        links.download(context).unwrap().iter().map(|l| u64::from(l.weight.to_bits()) << 32 | u64::from(l.sender));
+        links.download(context).unwrap().into_iter().map(|l| u64::from(l.weight.to_bits()) << 32 | u64::from(l.sender));
     let download = |buffer| context.download(buffer).unwrap();
     let outcomes = method.outcomes();
     (words.collect(), download(&links.offsets), download(&outcomes.escaped), download(&outcomes.counts))

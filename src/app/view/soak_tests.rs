@@ -10,10 +10,14 @@ use super::*;
 use crate::methods::METHODS;
 
 /// Small enough for every method, and enough for what its settings cost.
-const SMALL: [(&str, &str); 3] = [
-    ("surface-shadow-maps", "--set atlas_resolution=24 --set map_resolution=8 --set keep_maps=false --set light_samples=2"),
+const SMALL: [(&str, &str); 4] = [
+    (
+        "surface-shadow-maps",
+        "--set atlas_resolution=24 --set map_resolution=8 --set keep_maps=false --set light_samples=2",
+    ),
     ("explicit-visibility", "--set rays_per_element=64"),
     ("implicit-visibility", "--set bins=8"),
+    ("face-cluster", "--set threshold=0.001"),
 ];
 
 /// SplitMix64.
@@ -96,7 +100,7 @@ fn bytes(context: &Context) -> u64 {
 
 #[test]
 fn random_edits_leave_pictures_and_memory_as_they_were() {
-    let frames: u64 = variable("LINKLIGHT_SOAK_FRAMES").map_or(16, |text| text.parse().unwrap());
+    let frames: u64 = variable("LINKLIGHT_SOAK_FRAMES").map_or(12, |text| text.parse().unwrap());
     let seed: u64 = variable("LINKLIGHT_SOAK_SEED").map_or(1, |text| text.parse().unwrap());
     let scenes = variable("LINKLIGHT_SOAK_SCENES").unwrap_or_else(|| "cornell-box".into());
     let methods = variable("LINKLIGHT_SOAK_METHODS");
@@ -127,7 +131,10 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
         if frame % every == 0 {
             let fresh = pixels(&context, &mut Engine::new(&context), &options);
             assert!(picture == fresh, "{options}: frame {frame} of seed {seed} is not a new engine's");
-            assert!(pixels(&context, &mut engine, &asked(&first_state)) == first, "{options}: frame {frame}, then back");
+            assert!(
+                pixels(&context, &mut engine, &asked(&first_state)) == first,
+                "{options}: frame {frame}, then back"
+            );
             levels.push(bytes(&context));
         }
     }
