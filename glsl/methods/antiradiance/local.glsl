@@ -5,10 +5,6 @@
 // params.add_environment.
 
 const float PI = 3.14159265358979;
-const uint LOCAL_PARTS = 4;     // threads of a leaf; as many workgroups in y
-
-uint first_bin(uint part) { return part * BIN_COUNT / LOCAL_PARTS; }
-
 #include "methods/antiradiance/table.glsl"
 
 // What a leaf received itself and what its ancestors did, which stands with its parent: a macro, buffers are no arguments.

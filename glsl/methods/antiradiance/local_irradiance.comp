@@ -4,10 +4,10 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per leaf and quarter of the bins: irradiance of both sides.                          [Dachsbacher2007 4.2 local pass]
+// One thread per leaf and few bins: irradiance of both sides.                          [Dachsbacher2007 4.2 local pass]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), means[2 leaf_count] (W m^-2 sr^-1), peaks[BIN_COUNT * leaf_count] (of the mean)
-// writes parts[LOCAL_PARTS * 2 * leaf_count] (W/m2, fronts and backs of a quarter one after the other)   shared none
+// writes parts[BIN_COUNT / BINS_A_THREAD * 2 * leaf_count] (W/m2, fronts and backs of some bins one after the other)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
@@ -43,7 +43,7 @@ void main()
 
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
-    for (uint bin = first_bin(part); bin < first_bin(part + 1); ++bin) {
+    for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         float cosine = dot(own.normal, bin_directions[bin]);
         vec3 arriving = arriving_in(own.node, parent, bin);
         if (params.sets_floor == 0)

@@ -3,7 +3,7 @@
 #include "lib/hierarchy.glsl"
 
 // One thread per leaf: its irradiance from the parts, and what its sides reflect of it.     [Dachsbacher2007 4.2 local pass, Eq. 18]
-// reads parts[LOCAL_PARTS * 2 * leaf_count] (W/m2), leaves, source[2 leaf_count] (radiosity that needs no transport, W/m2, front
+// reads parts[part_count * 2 * leaf_count] (W/m2), leaves, source[2 leaf_count] (radiosity that needs no transport, W/m2, front
 //       and back), albedo[element_count]
 // updates radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1)   writes irradiance[2 leaf_count] (W/m2)   shared none
 layout(local_size_x = 64) in;

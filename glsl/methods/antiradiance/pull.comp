@@ -3,13 +3,12 @@
 #include "lib/prelude.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per inner node of one level and eighth of the bins: exitant intensity per area from the children's.
+// One thread per inner node of one level and few bins: exitant intensity per area from the children's.
 //                                                                                               [Dachsbacher2007 4.2 pull]
-// reads level_nodes, nodes   updates exitant[BIN_COUNT * node_count] (W m^-2 sr^-1); the level below is already done   shared none
+// reads level_nodes, nodes   updates exitant[bin_count * node_count] (W m^-2 sr^-1); the level below is already done   shared none
 // Differs from [Dachsbacher2007]: per area, a mean in place of a sum, so that f16 has digits for small and large nodes alike.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
-layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer LevelNodes { uint level_nodes[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 2, scalar) buffer Exitant { uint64_t exitant[]; };
@@ -17,7 +16,6 @@ layout(push_constant, scalar) uniform Params { uint first; uint count; uint node
 
 #include "methods/antiradiance/table.glsl"
 
-const uint SWEEP_PARTS = 8;     // threads of a node; as many workgroups in y
 const uint MAX_CHILDREN = 4;
 
 void main()
@@ -38,8 +36,7 @@ void main()
     float area = weights.x + weights.y + weights.z + weights.w;
     if (area > 0.0) weights /= area;
 
-    uint last_bin = (part + 1) * BIN_COUNT / SWEEP_PARTS;
-    for (uint bin = part * BIN_COUNT / SWEEP_PARTS; bin < last_bin; ++bin) {
+    for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         uvec4 entries = children + bin * params.node_count;
         vec3 mean = weights.x * LOAD_ENTRY(exitant, entries.x) + weights.y * LOAD_ENTRY(exitant, entries.y)
                     + weights.z * LOAD_ENTRY(exitant, entries.z) + weights.w * LOAD_ENTRY(exitant, entries.w);

@@ -4,6 +4,10 @@
 // make few loads, which is what these passes wait for; what one bin's transfers read is a stretch that caches hold.
 // The kernel declares the specialisation constant WORDS (1 or 2 a entry) and arrays of uint64_t for the tables it binds.
 
+// Bins that one thread works through, where its neighbours work through the same bins of the next nodes: few enough that a
+// memory's prefetching follows all their stretches of the table.
+const uint BINS_A_THREAD = 8;
+
 // Where a table of `node_count` nodes has a bin of a node.
 uint entry_of(uint node, uint bin, uint node_count) { return bin * node_count + node; }
 

@@ -10,9 +10,8 @@ use crate::stages::elements::Elements;
 use crate::stages::hierarchy::Hierarchy;
 use glam::{Vec2, Vec3};
 
-/// Threads of a leaf in `local.glsl`, and of an inner node in `push.comp` and `pull.comp`.
-pub(super) const LOCAL_PARTS: u32 = 4;
-const SWEEP_PARTS: u32 = 8;
+/// Of one thread, in `table.glsl`.
+const BINS_A_THREAD: u32 = 8;
 
 /// Light by direction and node, and by leaf and side. Entry of a table: `bin * nodes + node`, [`Tables::words`] words of 64
 /// bits.
@@ -40,14 +39,15 @@ pub struct Tables {
     pub peaks: Buffer<f32>,
     /// What arrived last.
     pub irradiance: Buffer<Vec3>,
-    /// The same, front and back of each quarter of the bins in turn.
+    /// The same, front and back of each thread's bins in turn.
     irradiance_parts: Buffer<Vec3>,
     /// Direct light of linked emitters and of the environment.
     pub linked: Buffer<Vec3>,
     /// The leaves with specular lobes, and what those send.
     pub gloss: Gloss,
-    /// Per quarter of the bins and leaf, W: change of the exitant light in the last step, its sum, and what of it is reflected
-    /// and emitted.
+    /// Per thread's bins and leaf, W: change of the exitant light in the last step, and its sum.
+    residual_parts: Buffer<Vec2>,
+    /// Per leaf, W: the same of all bins, and what of the light is reflected and emitted.
     pub residuals: Buffer<Vec3>,
 }
 
@@ -95,6 +95,7 @@ impl Tables {
         let bin_count = bins.bins.count();
         let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
         let (leaves, sides) = (hierarchy.leaf_count() as usize, 2 * hierarchy.leaf_count() as usize);
+        let parts = (bin_count / BINS_A_THREAD) as usize;
         Ok(Self {
             bin_count,
             half,
@@ -111,8 +112,9 @@ impl Tables {
             irradiance: context.buffer("antiradiance/irradiance", sides)?,
             linked: context.buffer("antiradiance/linked irradiance", sides)?,
             peaks: context.buffer("antiradiance/peaks", leaves * bin_count as usize)?,
-            irradiance_parts: context.buffer("antiradiance/irradiance parts", sides * LOCAL_PARTS as usize)?,
-            residuals: context.buffer("antiradiance/residuals", leaves * LOCAL_PARTS as usize)?,
+            irradiance_parts: context.buffer("antiradiance/irradiance parts", sides * parts)?,
+            residual_parts: context.buffer("antiradiance/residual parts", leaves * parts)?,
+            residuals: context.buffer("antiradiance/residuals", leaves)?,
         })
     }
 
@@ -190,14 +192,14 @@ impl Tables {
                 level_nodes: &hierarchy.levels.nodes,
                 nodes: &hierarchy.nodes,
                 incident: &self.incident,
-                constants: passes::PushConstants { words: Self::words(self.half) as u32, bin_count: self.bin_count },
+                constants: passes::PushConstants { words: Self::words(self.half) as u32 },
                 params: passes::PushParams {
                     first: level.start,
                     count: level.len() as u32,
                     node_count: hierarchy.node_count(),
                 },
             };
-            recorder.dispatch(&pass, Threads::Grid(level.len() as u32, SWEEP_PARTS, 1));
+            recorder.dispatch(&pass, Threads::Grid(level.len() as u32, self.bin_count / BINS_A_THREAD, 1));
         });
     }
 
@@ -215,6 +217,7 @@ impl Tables {
         }
         let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
         let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
+        let part_count = bin_count / BINS_A_THREAD;
         let undershoot = step.bounced * self.undershoot;
         let (sets_floor, add_environment) = (u32::from(step.sets_floor), u32::from(step.has_environment));
         let irradiance = passes::LocalIrradiance {
@@ -240,7 +243,7 @@ impl Tables {
             irradiance: &self.irradiance,
             params: passes::LocalReflectParams {
                 leaf_count,
-                part_count: LOCAL_PARTS,
+                part_count,
                 update_radiosity: u32::from(step.reflects),
                 sets_floor,
             },
@@ -258,7 +261,7 @@ impl Tables {
             glossy_of_leaf: &self.gloss.glossy_of_leaf,
             specular: &self.gloss.specular,
             exitant: &self.exitant,
-            residuals: &self.residuals,
+            residual_parts: &self.residual_parts,
             constants: passes::LocalExitantConstants { words, bin_count },
             params: passes::LocalExitantParams {
                 leaf_count,
@@ -269,10 +272,18 @@ impl Tables {
                 add_environment,
             },
         };
+        let residual = passes::LocalResidual {
+            residual_parts: &self.residual_parts,
+            leaves: &hierarchy.leaves,
+            radiosity: &self.radiosity,
+            residuals: &self.residuals,
+            params: passes::LocalResidualParams { leaf_count, part_count },
+        };
         recorder.scope("local", |recorder| {
-            recorder.dispatch(&irradiance, Threads::Grid(leaf_count, LOCAL_PARTS, 1));
+            recorder.dispatch(&irradiance, Threads::Grid(leaf_count, part_count, 1));
             recorder.dispatch(&reflect, leaf_count);
-            recorder.dispatch(&exitant, Threads::Grid(leaf_count, LOCAL_PARTS, 1));
+            recorder.dispatch(&exitant, Threads::Grid(leaf_count, part_count, 1));
+            recorder.dispatch(&residual, leaf_count);
         });
         recorder.scope("pull", |recorder| {
             hierarchy.levels.upwards(recorder, |recorder, level| {
@@ -280,10 +291,10 @@ impl Tables {
                     level_nodes: &hierarchy.levels.nodes,
                     nodes: &hierarchy.nodes,
                     exitant: &self.exitant,
-                    constants: passes::PullConstants { words, bin_count },
+                    constants: passes::PullConstants { words },
                     params: passes::PullParams { first: level.start, count: level.len() as u32, node_count },
                 };
-                recorder.dispatch(&pass, Threads::Grid(level.len() as u32, SWEEP_PARTS, 1));
+                recorder.dispatch(&pass, Threads::Grid(level.len() as u32, self.bin_count / BINS_A_THREAD, 1));
             });
         });
     }

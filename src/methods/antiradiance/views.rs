@@ -64,8 +64,7 @@ impl Antiradiance {
             }
             DebugView::Residual => {
                 let residuals = context.download(&self.tables.residuals)?;
-                for (index, leaf) in plan.leaves.iter().enumerate() {
-                    let residual: Vec3 = residuals.iter().skip(index).step_by(plan.leaves.len()).sum();
+                for (leaf, residual) in plan.leaves.iter().zip(&residuals) {
                     let share = if residual.y > 0.0 { residual.x / residual.y } else { 0.0 };
                     self.color_leaf(leaf.node, false_color::of_amount(share), &mut colors);
                 }
