@@ -173,7 +173,8 @@ fn office(criterion: &mut Criterion) {
         context.take_records();
         method.solve(&context, &prepared.world, 4, &Unwatched).unwrap();
         let records = context.take_records();
-        local = local.min(device_ms(&records, &["/local_irradiance", "/local_reflect", "/local_exitant", "/local_residual"]));
+        local = local
+            .min(device_ms(&records, &["/local_irradiance", "/local_reflect", "/local_exitant", "/local_residual"]));
         global = global.min(device_ms(&records, &["/gather"]));
         push_pull = push_pull.min(device_ms(&records, &["/push", "/pull"]));
     }

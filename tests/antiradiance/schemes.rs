@@ -9,13 +9,13 @@ use linklight::methods::antiradiance::{Scheme, Settings, growth_rate};
 fn both_schemes_agree_after_many_steps() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
-    for undershoot in [0.0, 0.5, 1e9] {
+    for undershoot in [0.5, 1e9] {
         let base = Settings { undershoot, refinement: 3.0, ..settings(128) };
         let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
-        let asymmetric = Settings { scheme: Scheme::Asymmetric, depth: 40, tolerance: 1e-7, ..base };
+        let asymmetric = Settings { scheme: Scheme::Asymmetric, depth: 20, tolerance: 1e-7, ..base };
         let light = |settings| {
             let mut method = prepare(&context, &fixture, settings);
-            let indirect = solve(&context, &mut method, &fixture, 40).indirect;
+            let indirect = solve(&context, &mut method, &fixture, 30).indirect;
             (indirect, method.residuals().to_vec())
         };
         let (one, residuals) = light(symmetric);
@@ -26,6 +26,9 @@ fn both_schemes_agree_after_many_steps() {
         let last = residuals.last().unwrap();
         assert!(last.relative() < 1e-5, "{last:?}");
         assert!(growth_rate(&residuals[..20]).unwrap() < 1.0);
+        if undershoot > 1.0 {
+            continue;
+        }
         // Steps of half the length end in the same place; a few steps do not.
         let (damped, _) = light(Settings { damping: 0.5, iterations: 200, ..symmetric });
         assert!(relative_rmse(&damped, &other) < 1e-4, "{}", relative_rmse(&damped, &other));
@@ -34,32 +37,37 @@ fn both_schemes_agree_after_many_steps() {
     }
 }
 
-/// 300 steps on the office, whose shelves have dozens of surfaces one behind the other: antiradiance settles, and stays.
+/// 300 steps on the office, whose shelves have dozens of surfaces one behind the other: both schemes settle, and in one place.
 #[test]
 fn the_office_settles_over_300_steps() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("office"), None);
-    let base = Settings { depth: 100, tolerance: 0.0, refinement: 8.0, half_tables: true, ..settings(72) };
-    let mut method = prepare(&context, &fixture, base);
-    println!("{}", method.report());
-    solve(&context, &mut method, &fixture, 3);
-    let residuals: Vec<_> = method.residuals().iter().filter(|r| r.bounce > 0).collect();
-    assert_eq!(residuals.len(), 300);
-    for bounce in 1..=3 {
-        let own: Vec<f64> = residuals.iter().filter(|r| r.bounce == bounce).map(|r| r.relative()).collect();
-        println!("bounce {bounce}: a step changes {:.1e} of the light at first, {:.1e} at last", own[0], own[99]);
-        assert!(own[99] < 2e-3 && own[99] < 0.05 * own[0], "{own:?}");
+    // Four steps of antiradiance to one of light, as in the paper.
+    let base = Settings { depth: 4, tolerance: 0.0, refinement: 8.0, ..settings(72) };
+    let mut light = Vec::new();
+    for (name, settings) in
+        [("asymmetric", base), ("symmetric", Settings { scheme: Scheme::Symmetric, iterations: 300, ..base })]
+    {
+        let mut method = prepare(&context, &fixture, settings);
+        light.push(solve(&context, &mut method, &fixture, 75).indirect);
+        let residuals: Vec<_> = method.residuals().iter().filter(|r| r.bounce > 0).collect();
+        assert_eq!(residuals.len(), 300);
+        let at = |step: usize| residuals[step].relative();
+        println!(
+            "{name}, {}, damped by {}: a step changes {:.1e} of the light at first, {:.1e} after 100, {:.1e} after 300",
+            method.report(),
+            method.damping(),
+            at(0),
+            at(99),
+            at(299)
+        );
+        assert!(at(299) < 1e-5, "{}", at(299));
+        let largest = residuals.iter().map(|r| r.total).fold(0.0, f64::max);
+        assert!(largest < 3.0 * residuals[299].total, "{largest}");
     }
-    let largest = residuals.iter().map(|r| r.total).fold(0.0, f64::max);
-    assert!(largest < 3.0 * residuals[0].total, "{largest}");
-
-    // The symmetric scheme too.
-    let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
-    let mut method = prepare(&context, &fixture, symmetric);
-    solve(&context, &mut method, &fixture, 3);
-    let residuals: Vec<_> = method.residuals().iter().filter(|r| r.bounce > 0).map(|r| r.relative()).collect();
-    println!("symmetric, damped by {}: {:.1e} at first, {:.1e} at last", method.damping(), residuals[0], residuals[99]);
-    assert!(residuals[99] < 2e-3, "{residuals:?}");
+    let difference = relative_rmse(&light[0], &light[1]);
+    println!("the schemes differ by {difference:.2e}");
+    assert!(difference < 1e-4, "{difference}");
 }
 
 /// The f16 tables' error, as the settings say.

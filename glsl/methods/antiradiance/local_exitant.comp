@@ -37,6 +37,7 @@ layout(push_constant, scalar) uniform Params {
     uint sets_floor;            // 1: what arrives now, uncut, sets how far below zero later light may fall
     float undershoot;           // see floor.glsl
     float damping;              // share of the new exitant light; the rest stays as it was
+    uint keeps_light;           // 1: what is reflected and emitted is in the table already
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
 
@@ -67,6 +68,12 @@ void main()
         bool leaves_front = cosine > 0.0;
         vec3 radiance = leaves_front ? l_front : l_back;
         if (glossy != NONE) radiance += specular[glossy * BIN_COUNT + bin];
+        float held = discrete_cosine(cosine, norm, BIN_COUNT);
+        if (params.keeps_light != 0 && leaves_front && !blocks_behind) {
+            vec3 size = abs(held * radiance);
+            residual.y += size.r + size.g + size.b;
+            continue;
+        }
         if (!leaves_front || blocks_behind) {
             vec3 arriving = arriving_in(own.node, parent, bin), mean = leaves_front ? mean_back : mean_front;
             uint at = bin * params.leaf_count + leaf;
@@ -76,7 +83,7 @@ void main()
         }
         uint entry = entry_of(own.node, bin, params.node_count);
         vec3 before = LOAD_ENTRY(exitant, entry);
-        vec3 intensity = mix(before, discrete_cosine(cosine, norm, BIN_COUNT) * radiance, params.damping);
+        vec3 intensity = mix(before, held * radiance, params.damping);
         vec3 change = abs(intensity - before);
         residual += vec2(change.r + change.g + change.b, abs(intensity.r) + abs(intensity.g) + abs(intensity.b));
         STORE_ENTRY(exitant, entry, intensity);

@@ -40,11 +40,14 @@ void main()
     uint parent = nodes[own.node].parent;
     float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
     vec3 mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
+    // What meets the back counts where it is reflected, and for the floor of what is taken away from it.
+    bool needs_back = (own.flags & REFLECTS_BEHIND) != 0 || (params.sets_floor != 0 && (own.flags & BLOCKS_BEHIND) != 0);
 
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
     for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         float cosine = dot(own.normal, bin_directions[bin]);
+        if (cosine > 0.0 && !needs_back) continue;
         vec3 arriving = arriving_in(own.node, parent, bin);
         if (params.sets_floor == 0)
             arriving = max(arriving, lowest_of(peaks[bin * params.leaf_count + leaf], cosine <= 0.0 ? mean_front : mean_back, params.undershoot));

@@ -269,6 +269,7 @@ impl Tables {
                 sets_floor,
                 undershoot,
                 damping: step.damping,
+                keeps_light: u32::from(!step.reflects && !step.sets_floor && step.damping == 1.0),
                 add_environment,
             },
         };
