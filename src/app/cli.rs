@@ -239,6 +239,9 @@ pub struct ViewArgs {
     /// Start with the panels hidden: the picture fills the window
     #[arg(long)]
     pub bare: bool,
+    /// Write a RenderDoc capture of the first picture in full quality
+    #[arg(long, value_name = "FILE.rdc")]
+    pub capture: Option<PathBuf>,
     /// Watch this folder of shaders, a checkout's glsl, and take what changes; errors are shown over the picture
     #[arg(long, value_name = "DIR")]
     pub shaders: Option<PathBuf>,

@@ -1,18 +1,18 @@
 //! The frame: from a staged scene to a film, by the method that was asked for.
 
-use super::AppError;
-use super::cli::{Channel, Display};
+use super::cli::Display;
 use super::on_clusters::ClustersShown;
 use super::on_elements::OnElements;
 use super::on_texels::TexelsShown;
+pub use super::output::picture;
 use super::render::RenderRequest;
 use super::stage::Stage;
+use super::{AppError, views};
 use crate::display::direct::{Canvas, Sample};
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::splat::{self, SplatLight, SplatSums};
-use crate::display::tone_map::LightParts;
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Context;
 use crate::methods::antiradiance::Antiradiance;
@@ -21,7 +21,6 @@ use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
-use crate::report::image::Picture;
 use crate::stages::film::Film;
 use crate::stages::sender_tree::{VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
@@ -236,6 +235,18 @@ impl Method {
         film: &Film,
         watch: &dyn Watch,
     ) -> Result<(), AppError> {
+        self.light_frame(context, request, stage, film, watch)?;
+        if request.shows_bad_values { views::paint_bad_values(context, film) } else { Ok(()) }
+    }
+
+    fn light_frame(
+        &mut self,
+        context: &Context,
+        request: &RenderRequest,
+        stage: &Stage,
+        film: &Film,
+        watch: &dyn Watch,
+    ) -> Result<(), AppError> {
         let Stage { world, view, pose, bounds, .. } = stage;
         match self {
             Self::PathTracing(method) => {
@@ -408,26 +419,4 @@ pub(super) fn gather_samples(
     let report = display.report(context)?;
     tracing::info!("{report}");
     Ok(())
-}
-
-/// Reads the film back: the light asked for as RGB, and the extra channels.
-pub fn picture(context: &Context, request: &RenderRequest, film: &Film) -> Result<Picture, AppError> {
-    let direct = context.download(&film.direct)?;
-    let indirect = context.download(&film.indirect)?;
-    let rgb = match request.light {
-        LightParts::All => direct.iter().zip(&indirect).map(|(&d, &i)| d + i).collect(),
-        LightParts::DirectOnly => direct.clone(),
-        LightParts::IndirectOnly => indirect.clone(),
-    };
-    let mut picture = Picture::new(film.width, film.height, rgb)?;
-    for channel in &request.channels {
-        match channel {
-            Channel::Direct => picture.add_rgb("direct", &direct)?,
-            Channel::Indirect => picture.add_rgb("indirect", &indirect)?,
-            Channel::Albedo => picture.add_rgb("albedo", &context.download(&film.albedo)?)?,
-            Channel::Normal => picture.add_xyz("normal", &context.download(&film.normal)?)?,
-            Channel::Depth => picture.add_channel("depth.Z", context.download(&film.depth)?)?,
-        }
-    }
-    Ok(picture)
 }

@@ -6,15 +6,18 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::AppError;
+use super::cli::Channel;
 use super::measure;
 use super::render::RenderRequest;
 use super::values::Format;
-use crate::gpu;
+use crate::display::tone_map::LightParts;
+use crate::gpu::{self, Context};
 use crate::report::image::{self, Metadata, Picture};
 use crate::report::pass_hashes::{self, HashFile, PassHash};
 use crate::report::profile::{Profile, SceneFacts};
 use crate::report::table;
 use crate::report::trace::{self, TimeLine};
+use crate::stages::film::Film;
 
 /// Write the picture as the request asks: radiance and channels as .exr, tone-mapped as .png. The settings, the scene
 /// and the device are stored in it.
@@ -33,6 +36,28 @@ pub fn write_picture(request: &RenderRequest, mut picture: Picture, device: &gpu
         }
     }
     Ok(())
+}
+
+/// Reads the film back: the light asked for as RGB, and the extra channels.
+pub fn picture(context: &Context, request: &RenderRequest, film: &Film) -> Result<Picture, AppError> {
+    let direct = context.download(&film.direct)?;
+    let indirect = context.download(&film.indirect)?;
+    let rgb = match request.light {
+        LightParts::All => direct.iter().zip(&indirect).map(|(&d, &i)| d + i).collect(),
+        LightParts::DirectOnly => direct.clone(),
+        LightParts::IndirectOnly => indirect.clone(),
+    };
+    let mut picture = Picture::new(film.width, film.height, rgb)?;
+    for channel in &request.channels {
+        match channel {
+            Channel::Direct => picture.add_rgb("direct", &direct)?,
+            Channel::Indirect => picture.add_rgb("indirect", &indirect)?,
+            Channel::Albedo => picture.add_rgb("albedo", &context.download(&film.albedo)?)?,
+            Channel::Normal => picture.add_xyz("normal", &context.download(&film.normal)?)?,
+            Channel::Depth => picture.add_channel("depth.Z", context.download(&film.depth)?)?,
+        }
+    }
+    Ok(picture)
 }
 
 /// What a run measured.

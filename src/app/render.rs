@@ -67,6 +67,8 @@ pub struct RenderRequest {
     pub tone: ToneSettings,
     pub rays: Rays,
     pub seed: u32,
+    /// What is wrong with the film's values, in place of light.
+    pub shows_bad_values: bool,
     /// Changes of the scene.
     pub edits: Vec<Edit>,
     /// Checked: [`RenderRequest::settings`] of the method's own type succeeds.
@@ -241,6 +243,7 @@ impl RenderRequest {
             tone: ToneSettings { operator: args.tonemap, exposure: args.exposure, ..ToneSettings::default() },
             rays: args.rays,
             seed: args.seed,
+            shows_bad_values: views::shows_bad_values(&args),
             edits: args.edit.clone(),
             assignments: of_method,
             display_assignments: of_display,
@@ -292,6 +295,9 @@ impl RenderRequest {
         }
         if !self.edits.is_empty() {
             insert("edits", json!(self.edits.iter().map(Edit::to_string).collect::<Vec<_>>()));
+        }
+        if self.shows_bad_values {
+            insert("view", views::BAD_VALUES.name.into());
         }
         insert("diffuse", self.diffuse.into());
         insert("light", self.light.name().into());

@@ -9,8 +9,11 @@ use super::AppError;
 use super::cli::{Display, PictureArgs};
 use super::render::{RenderRequest, displays};
 use crate::display::final_gather;
+use crate::gpu::Context;
 use crate::methods::settings::{Assignment, ChoiceValue, Kind, SettingGroup as _, Spec, suggest};
 use crate::methods::{METHODS, Method};
+use crate::stages::film::Film;
+use glam::Vec3;
 
 /// Settings whose values are views; the default is light.
 const VIEW_SETTINGS: [&str; 3] = ["view", "show", "gather_shows"];
@@ -42,8 +45,15 @@ fn among(specs: &[Spec]) -> Vec<DebugView> {
     views
 }
 
-/// Puts the setting that `--view` stands for in its place.
+/// The view that every method and display has: of the film, whatever made it.
+pub const BAD_VALUES: ChoiceValue =
+    ChoiceValue { name: "bad-values", doc: "NaN magenta, infinite yellow, negative blue; all else gray" };
+
+/// Puts the setting that `--view` stands for in its place; the view of the film has none, and stays.
 pub fn resolve(args: &mut PictureArgs) -> Result<(), AppError> {
+    if shows_bad_values(args) {
+        return Ok(());
+    }
     let Some(name) = args.view.take() else { return Ok(()) };
     let display = displays(args.method).first().map(|&default| args.display.unwrap_or(default));
     // A gather shows no colours of elements, and nothing else shows cuts.
@@ -60,8 +70,41 @@ pub fn resolve(args: &mut PictureArgs) -> Result<(), AppError> {
     Err(AppError::Usage(format!("{of} has no view {name:?}; {hint} (linklight methods --views lists all)")))
 }
 
+/// Whether the view of the film is asked for.
+pub fn shows_bad_values(args: &PictureArgs) -> bool {
+    args.view.as_deref() == Some(BAD_VALUES.name)
+}
+
+/// Paints a film by what is wrong with its values.
+pub fn paint_bad_values(context: &Context, film: &Film) -> Result<(), AppError> {
+    let (direct, indirect) = (context.download(&film.direct)?, context.download(&film.indirect)?);
+    let mean = direct.iter().zip(&indirect).map(|(d, i)| (*d + *i).element_sum()).filter(|sum| sum.is_finite());
+    let mean = mean.sum::<f32>() / (3 * direct.len().max(1)) as f32;
+    let colors: Vec<Vec3> = direct.iter().zip(&indirect).map(|(&d, &i)| color_of(d, i, mean)).collect();
+    context.write(&film.direct, &colors)?;
+    Ok(context.write(&film.indirect, &vec![Vec3::ZERO; colors.len()])?)
+}
+
+/// The colour of a pixel in a picture of that mean.
+fn color_of(direct: Vec3, indirect: Vec3, mean: f32) -> Vec3 {
+    let both = [direct, indirect];
+    if both.iter().any(|value| value.is_nan()) {
+        Vec3::new(1.0, 0.0, 1.0)
+    } else if both.iter().any(|value| !value.is_finite()) {
+        Vec3::new(1.0, 1.0, 0.0)
+    } else if both.iter().any(|value| value.min_element() < 0.0) {
+        Vec3::new(0.0, 0.2, 1.0)
+    } else {
+        let shown = (direct + indirect).element_sum() / (3.0 * mean.max(f32::MIN_POSITIVE));
+        Vec3::splat(0.25 * shown / (1.0 + shown))
+    }
+}
+
 /// Whether a picture shows a view in place of light.
 pub fn is_shown(request: &RenderRequest) -> bool {
+    if request.shows_bad_values {
+        return true;
+    }
     let views = of_method(request.method).into_iter().chain(of_final_gather());
     let mut asked = request.assignments.iter().chain(&request.display_assignments);
     let names: Vec<DebugView> = views.collect();
@@ -73,7 +116,8 @@ pub fn list(out: &mut dyn Write) -> Result<(), AppError> {
     for method in METHODS {
         write(out, method.key, &of_method(method))?;
     }
-    write(out, "--display final-gather", &of_final_gather())
+    write(out, "--display final-gather", &of_final_gather())?;
+    write(out, "every method and display", &[DebugView { setting: "", value: BAD_VALUES }])
 }
 
 fn write(out: &mut dyn Write, owner: &str, views: &[DebugView]) -> Result<(), AppError> {
@@ -133,11 +177,28 @@ mod tests {
     }
 
     #[test]
+    fn bad_values_are_told_apart_whatever_the_method() {
+        let good = Vec3::splat(0.5);
+        let colors = [
+            color_of(Vec3::new(1.0, f32::NAN, -1.0), good, 1.0),
+            color_of(good, Vec3::new(f32::INFINITY, 0.0, 0.0), 1.0),
+            color_of(good, Vec3::new(0.0, -1e-20, 0.0), 1.0),
+        ];
+        let gray = |color: Vec3| color.x == color.y && color.y == color.z && color.is_finite();
+        assert!(colors.iter().all(|color| !gray(*color)) && colors[0] != colors[1] && colors[1] != colors[2]);
+        assert!([Vec3::ZERO, good, Vec3::splat(1e30)].iter().all(|&value| gray(color_of(value, good, 0.0))));
+        for method in METHODS {
+            assert!(request(&format!("--method {} --view bad-values", method.key)).unwrap().shows_bad_values);
+        }
+        assert!(!request("").unwrap().shows_bad_values);
+    }
+
+    #[test]
     fn the_list_has_every_view() {
         let mut text = Vec::new();
         list(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
-        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size", "link-age"] {
+        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size", "link-age", "bad-values"] {
             assert!(text.contains(&format!("--view {name} ")), "{name} in\n{text}");
         }
     }

@@ -70,6 +70,8 @@ pub(super) struct RawBuffer {
     pub raw: vk::Buffer,
     pub id: u64,
     pub name: String,
+    /// As asked for.
+    pub bytes: u64,
     pub allocation: Option<Allocation>,
     device: Arc<Device>,
 }
@@ -102,7 +104,8 @@ impl RawBuffer {
             let bound = device.raw.bind_buffer_memory(raw, allocation.memory(), allocation.offset());
             device.set_name(raw, name);
             let id = device.new_id();
-            let buffer = Self { raw, id, name: name.to_owned(), allocation: Some(allocation), device: device.clone() };
+            let buffer =
+                Self { raw, id, name: name.to_owned(), bytes, allocation: Some(allocation), device: device.clone() };
             bound.checked("vkBindBufferMemory", name)?;
             Ok(buffer)
         }

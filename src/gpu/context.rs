@@ -11,6 +11,7 @@ use super::pipelines::Pipelines;
 use super::profiler::{ClockPair, PassRecord};
 use super::recorder::{CommandSlot, PASSES_PER_POOL, Recorder};
 use super::selection::{self, DeviceInfo};
+use super::staging::StagingPool;
 use super::{Buffer, TexelBuffer};
 use ash::vk;
 use std::collections::BTreeMap;
@@ -75,6 +76,7 @@ pub struct Context {
     pub(super) pipelines: Pipelines,
     pub(super) markers: Markers,
     pub(super) queue_lock: Mutex<()>,
+    pub(super) staging_pool: Mutex<StagingPool>,
     slots: Mutex<Vec<CommandSlot>>,
     records: Mutex<Vec<PassRecord>>,
     hashes: Mutex<Vec<PassHash>>,
@@ -103,6 +105,7 @@ impl Context {
             pipelines,
             markers,
             queue_lock: Mutex::default(),
+            staging_pool: Mutex::default(),
             slots: Mutex::default(),
             records: Mutex::default(),
             hashes: Mutex::default(),
@@ -188,6 +191,11 @@ impl Context {
     /// Device memory by owner (the part of names before the first '/').
     pub fn memory_by_owner(&self) -> BTreeMap<String, MemoryUse> {
         self.device.memory_by_owner()
+    }
+
+    /// Allocations of device memory so far, staging memory counted.
+    pub fn allocation_count(&self) -> u64 {
+        self.device.allocations.load(Ordering::Relaxed)
     }
 
     /// Pipelines made so far.

@@ -58,6 +58,8 @@ pub(super) struct Device {
     /// Value of the last submission known to be complete.
     pub completed: AtomicU64,
     pub open_recorders: AtomicU64,
+    /// Made so far.
+    pub allocations: AtomicU64,
     /// It was lost, or never finished: nothing more will come of it.
     pub is_lost: AtomicBool,
     /// It did not finish in time, and may be at work for ever: nothing that it uses is given back.
@@ -199,6 +201,7 @@ impl Device {
                 submitted: AtomicU64::new(0),
                 completed: AtomicU64::new(0),
                 open_recorders: AtomicU64::new(0),
+                allocations: AtomicU64::new(0),
                 is_lost: AtomicBool::new(false),
                 is_hung: AtomicBool::new(false),
                 next_id: AtomicU64::new((DEVICES.fetch_add(1, Ordering::Relaxed) + 1) << NUMBER_BITS),
@@ -311,6 +314,7 @@ impl Device {
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
             .map_err(fail)?;
+        self.allocations.fetch_add(1, Ordering::Relaxed);
         let mut memory = lock(&self.memory);
         let usage = memory.entry(owner(name).to_owned()).or_default();
         usage.current_bytes += allocation.size();

@@ -33,6 +33,7 @@ pub mod reflection;
 mod reload;
 mod selection;
 pub mod shader_compiler;
+mod staging;
 mod submission;
 mod target;
 mod texel_buffer;

@@ -8,6 +8,7 @@ use super::pass::{Bindings, Pass, Program};
 use super::pass_hashes::PendingHashes;
 use super::pipelines::{Bound, RasterState, stage_flags};
 use super::profiler::Cost;
+use super::staging::Way;
 use super::target::{Target, attachment};
 use super::{Buffer, RawBuffer};
 use ash::vk;
@@ -76,7 +77,7 @@ pub struct Recorder<'c> {
     pub(super) scopes: Vec<String>,
     pub(super) timed: Vec<Timed>,
     hazards: Hazards,
-    pub(super) staging: Vec<RawBuffer>,
+    pub(super) staging: Vec<(Way, RawBuffer)>,
     pub(super) error: Option<GpuError>,
     /// No pass was recorded since the last barrier.
     pub(super) is_behind_barrier: Cell<bool>,
@@ -425,8 +426,8 @@ impl<'c> Recorder<'c> {
     }
 
     /// Keeps a staging buffer alive until the submission ends.
-    pub(super) fn keep(&mut self, staging: RawBuffer) {
-        self.staging.push(staging);
+    pub(super) fn keep(&mut self, way: Way, staging: RawBuffer) {
+        self.staging.push((way, staging));
     }
 
     pub(super) fn fail(&mut self, error: GpuError) {

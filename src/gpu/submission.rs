@@ -5,6 +5,7 @@ use super::device::lock;
 use super::error::{Checked, GpuError};
 use super::profiler::PassRecord;
 use super::recorder::{PASSES_PER_POOL, Recorder};
+use super::staging::Way;
 use ash::vk;
 use std::sync::atomic::Ordering;
 
@@ -15,20 +16,32 @@ const STATISTICS: [(&str, bool); 3] =
 impl Recorder<'_> {
     /// Submits, waits until the device is done, and hands the pass records to the context.
     pub fn submit(mut self) -> Result<(), GpuError> {
-        self.finish().map(drop)
+        let kept = self.finish()?;
+        self.give_back(kept);
+        Ok(())
     }
 
     /// As [`Self::submit`], after `wait` and before `signal`: binary semaphores of the window system.
     pub(super) fn submit_between(mut self, wait: vk::Semaphore, signal: vk::Semaphore) -> Result<(), GpuError> {
-        self.finish_between(Some((wait, signal))).map(drop)
+        let kept = self.finish_between(Some((wait, signal)))?;
+        self.give_back(kept);
+        Ok(())
     }
 
     /// As [`Self::submit`], handing back the staging buffers (read-backs) in the order they were kept.
-    pub(super) fn finish(&mut self) -> Result<Vec<RawBuffer>, GpuError> {
+    pub(super) fn finish(&mut self) -> Result<Vec<(Way, RawBuffer)>, GpuError> {
         self.finish_between(None)
     }
 
-    fn finish_between(&mut self, between: Option<(vk::Semaphore, vk::Semaphore)>) -> Result<Vec<RawBuffer>, GpuError> {
+    /// Staging buffers that were read, for the next submission.
+    pub(super) fn give_back(&self, kept: Vec<(Way, RawBuffer)>) {
+        kept.into_iter().for_each(|(way, buffer)| self.context.give_staging(way, buffer));
+    }
+
+    fn finish_between(
+        &mut self,
+        between: Option<(vk::Semaphore, vk::Semaphore)>,
+    ) -> Result<Vec<(Way, RawBuffer)>, GpuError> {
         if let Some(error) = self.error.take() {
             return Err(error);
         }

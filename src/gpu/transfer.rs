@@ -8,9 +8,9 @@ use super::hazards::Access;
 use super::image::{Format, Image};
 use super::profiler::Cost;
 use super::recorder::Recorder;
+use super::staging::Way;
 use ash::vk;
 use bytemuck::Pod;
-use gpu_allocator::MemoryLocation;
 
 /// Staging memory per piece; larger data takes several submissions.
 const STAGING_BYTES: usize = 64 << 20;
@@ -52,13 +52,7 @@ impl Context {
             let count = piece.min(end - first);
             let size = size_of::<T>() as u64;
             let mut recorder = self.recorder("download")?;
-            let staging = RawBuffer::new(
-                &self.device,
-                "staging/download",
-                count as u64 * size,
-                vk::BufferUsageFlags::TRANSFER_DST,
-                MemoryLocation::GpuToCpu,
-            )?;
+            let staging = self.staging(Way::Down, count as u64 * size)?;
             recorder.copy_raw(
                 "transfer/download",
                 (buffer.raw(), buffer.id()),
@@ -67,12 +61,13 @@ impl Context {
                 0,
                 count as u64 * size,
             );
-            recorder.keep(staging);
+            recorder.keep(Way::Down, staging);
             let mut kept = recorder.finish()?;
-            if let Some(staging) = kept.last_mut() {
+            if let Some((_, staging)) = kept.last_mut() {
                 let bytes = &staging.mapped()[..count * size_of::<T>()];
                 data.extend(bytemuck::pod_collect_to_vec::<u8, T>(bytes));
             }
+            recorder.give_back(kept);
         }
         Ok(data)
     }
@@ -88,13 +83,7 @@ impl Context {
         }
         let bytes = u64::from(image.width) * u64::from(image.height) * pixel;
         let mut recorder = self.recorder("download")?;
-        let staging = RawBuffer::new(
-            &self.device,
-            "staging/download",
-            bytes,
-            vk::BufferUsageFlags::TRANSFER_DST,
-            MemoryLocation::GpuToCpu,
-        )?;
+        let staging = self.staging(Way::Down, bytes)?;
         let accesses = [
             Access { id: image.id(), reads: true, writes: false },
             Access { id: staging.id, reads: false, writes: true },
@@ -113,9 +102,11 @@ impl Context {
                 );
             }
         });
-        recorder.keep(staging);
+        recorder.keep(Way::Down, staging);
         let mut kept = recorder.finish()?;
-        let pixels = kept.last_mut().map(|staging| bytemuck::pod_collect_to_vec(&staging.mapped()[..bytes as usize]));
+        let pixels =
+            kept.last_mut().map(|(_, staging)| bytemuck::pod_collect_to_vec(&staging.mapped()[..bytes as usize]));
+        recorder.give_back(kept);
         Ok(pixels.unwrap_or_default())
     }
 }
@@ -143,7 +134,7 @@ impl Recorder<'_> {
                     offset,
                     bytes.len() as u64,
                 );
-                self.keep(staging);
+                self.keep(Way::Up, staging);
             }
             Err(error) => self.fail(error),
         }
@@ -214,7 +205,7 @@ impl Recorder<'_> {
                 );
             }
         });
-        self.keep(staging);
+        self.keep(Way::Up, staging);
     }
 
     /// Sets every pixel of a colour image.
@@ -307,10 +298,7 @@ impl Recorder<'_> {
     }
 
     fn stage(&mut self, bytes: &[u8]) -> Result<RawBuffer, GpuError> {
-        let device = &self.context().device;
-        let usage = vk::BufferUsageFlags::TRANSFER_SRC;
-        let mut staging =
-            RawBuffer::new(device, "staging/upload", bytes.len() as u64, usage, MemoryLocation::CpuToGpu)?;
+        let mut staging = self.context().staging(Way::Up, bytes.len() as u64)?;
         staging.mapped()[..bytes.len()].copy_from_slice(bytes);
         Ok(staging)
     }

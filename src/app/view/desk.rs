@@ -9,12 +9,12 @@ use super::engine::{Depth, Engine, Picked, change};
 use crate::app::AppError;
 use crate::app::frame::SAMPLING_TASKS;
 use crate::app::render::RenderRequest;
-use crate::gpu::Context;
+use crate::gpu::{Capture, Context};
 use crate::report::explanation::Explanation;
 use crate::report::profile::SceneFacts;
 use crate::scene::camera::View;
 use crate::stages::film::Film;
-use crate::stages::work::{Interrupted, Watch};
+use crate::stages::work::{Interrupted, Unwatched, Watch};
 use glam::UVec2;
 
 /// How often progress is told.
@@ -192,7 +192,7 @@ impl Desk {
     }
 
     /// Renders what is asked for until closed.
-    pub fn work(&self, mut engine: Engine<'_>) {
+    pub fn work<'c>(&self, mut engine: Engine<'c>, mut capture: Option<Capture<'c>>) {
         let mut bench = Bench { context: engine.context(), other: None, request: None, film: None, compared: None };
         while let Some(order) = self.next() {
             let job = match order {
@@ -226,7 +226,16 @@ impl Desk {
             if job.is_anew {
                 engine.prepare_anew();
             }
-            let result = engine.render(&job.request, &watch);
+            let mut result = engine.render(&job.request, &watch);
+            if result.is_ok()
+                && let Some(mut capture) = capture.take_if(|_| !job.is_preview)
+            {
+                // Everything is prepared: the capture holds a frame and nothing else.
+                capture.start();
+                result = engine.render(&job.request, &Unwatched);
+                let finished = capture.finish().map_err(AppError::from);
+                result = result.and_then(|film| finished.map(|()| film));
+            }
             let mut papers = self.lock();
             papers.news.progress = None;
             papers.news.is_working = papers.job.is_some();

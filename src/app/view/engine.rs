@@ -72,6 +72,7 @@ pub fn change(old: &RenderRequest, new: &RenderRequest) -> Option<Depth> {
         || old.free_camera != new.free_camera
         || old.bounces != new.bounces
         || old.spp != new.spp
+        || old.shows_bad_values != new.shows_bad_values
     {
         Some(Depth::Frame)
     } else {

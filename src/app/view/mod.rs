@@ -37,7 +37,8 @@ use super::AppError;
 use super::cli::{Global, ViewArgs};
 use super::crash;
 use super::render::{check_validation, device_options};
-use crate::gpu::{Context, Options, ShaderWatcher};
+use crate::gpu::{Capture, Context, Options, ShaderWatcher, prepare_capture};
+use crate::report::write::check_writable;
 use desk::Desk;
 use engine::Engine;
 use viewer::Viewer;
@@ -55,6 +56,10 @@ impl Drop for Closing<'_> {
 pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     if !args.shots.is_dir() {
         return Err(AppError::Usage(format!("--shots {} is no folder; make it first", args.shots.display())));
+    }
+    if let Some(path) = &args.capture {
+        check_writable(path)?;
+        prepare_capture()?;
     }
     // The options of the last picture that was asked for.
     let asked = Arc::new(Mutex::new(String::new()));
@@ -75,13 +80,14 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     let context = Context::new(options)?;
     let info = context.info();
     tracing::info!("device {} {} ({})", info.index, info.name, info.driver);
+    let capture = args.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
     // A closed event loop needs no news.
     let desk = Arc::new(Desk::new(move || {
         let _ = proxy.send_event(());
     }));
     let result = std::thread::scope(|scope| {
         let renderer = std::thread::Builder::new().name("renderer".into());
-        renderer.spawn_scoped(scope, || desk.work(Engine::new(&context)))?;
+        renderer.spawn_scoped(scope, || desk.work(Engine::new(&context), capture))?;
         // However this ends, the renderer is not left waiting.
         let _closing = Closing(&desk);
         let mut window = ViewWindow::new(&context, &desk, viewer, shaders);

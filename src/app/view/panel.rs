@@ -9,6 +9,7 @@ use super::{editor, settings};
 use crate::app::cli::Display;
 use crate::app::render::displays;
 use crate::app::state::name;
+use crate::app::views;
 use crate::display::final_gather;
 use crate::methods::METHODS;
 use crate::methods::settings::SettingGroup as _;
@@ -26,6 +27,7 @@ pub fn show(ui: &mut Ui, viewer: &mut Viewer, desk: &Desk) {
         light(ui, viewer);
         ui.separator();
         viewer.comparison.rows(ui);
+        bad_values(ui, viewer);
         ui.checkbox(&mut viewer.explains, "clicks explain a pixel").on_hover_text("X");
         ui.separator();
         camera(ui, viewer);
@@ -164,6 +166,13 @@ fn light(ui: &mut Ui, viewer: &mut Viewer) {
     choice(ui, "tone map", Operator::value_variants(), &mut args.tonemap);
     if args.env.is_some() {
         ui.add(Slider::new(&mut args.env_turn, -180.0..=180.0).text("environment, degrees"));
+    }
+}
+
+fn bad_values(ui: &mut Ui, viewer: &mut Viewer) {
+    let mut shows = views::shows_bad_values(&viewer.args);
+    if ui.checkbox(&mut shows, "NaN, infinite, negative").on_hover_text(views::BAD_VALUES.doc).changed() {
+        viewer.args.view = shows.then(|| views::BAD_VALUES.name.to_owned());
     }
 }
 
