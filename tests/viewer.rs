@@ -103,7 +103,7 @@ impl<'s> View<'s> {
     /// Until the picture is the one that the options decide. What was just done takes a moment to arrive.
     fn settle(&mut self) {
         std::thread::sleep(Duration::from_millis(150));
-        self.wait("finished picture", |view| view.title().ends_with("(ready)"));
+        self.wait("finished picture", |view| view.title().contains("(ready"));
     }
 
     fn key(&mut self, key: &str) {
@@ -214,6 +214,63 @@ impl Random {
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         ((z ^ (z >> 31)) % bound) as i32
     }
+}
+
+#[test]
+fn another_method_stands_beside_the_picture_and_differences_are_shown() {
+    let Some(screen_server) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut view = View::open(&screen_server, folder.path(), &format!("{SMALL} --against path-tracing"));
+    let figure = |title: &str| -> Option<(f64, u32)> {
+        let (_, rest) = title.split_once("relative MSE ")?;
+        let (figure, rest) = rest.split_once(" to path-tracing of ")?;
+        Some((figure.parse().ok()?, rest.trim_end_matches(')').parse().ok()?))
+    };
+    view.wait("a finer reference", |view| figure(&view.title()).is_some_and(|(_, spp)| spp >= 32));
+    let (error, _) = figure(&view.title()).unwrap();
+    assert!(error > 0.0 && error < 0.5, "relative MSE {error}");
+    let (width, height, pixels) = screen(&view);
+    assert_eq!((width, height), (320, 120), "two pictures side by side");
+    // Both halves show the room, one of them noisy.
+    let half = |first: u32| -> Vec<f64> {
+        let rows = (0..height).flat_map(|y| (first..first + 160).map(move |x| (y * 320 + x) as usize));
+        rows.map(|at| f64::from(pixels[3 * at + 1])).collect()
+    };
+    let (left, right) = (half(0), half(160));
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let off = left.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f64>() / left.len() as f64;
+    assert!(mean(&left) > 30.0 && (mean(&left) / mean(&right) - 1.0).abs() < 0.2 && off < 25.0 && off > 0.1, "{off}");
+    if let Ok(kept) = std::env::var("LINKLIGHT_KEEP_SHOTS") {
+        let path = Path::new(&kept).join("side-by-side.png");
+        image::save_buffer(path, &pixels, width, height, image::ColorType::Rgb8).unwrap();
+    }
+    let shot = view.shoot(1);
+    view.close();
+    // What is written is the picture itself.
+    assert_eq!(rgb(&shot.with_extension("png")), rgb(&headless(&shot, "")));
+}
+
+#[test]
+fn a_capture_from_the_window_holds_a_frame_in_words() {
+    let Some(screen_server) = Screen::start() else { return };
+    if Command::new("renderdoccmd").arg("--version").output().is_err() {
+        return println!("skipped: renderdoccmd is not installed (package renderdoc)");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("frame.rdc");
+    let mut view = View::open(&screen_server, folder.path(), &format!("{TINY} --capture {}", file.display()));
+    view.wait("the capture", |_| file.exists());
+    view.close();
+    assert!(std::fs::read(&file).unwrap().starts_with(b"RDOC"));
+    let xml = folder.path().join("frame.xml");
+    let convert =
+        Command::new("renderdoccmd").args(["convert", "-c", "xml", "-f"]).arg(&file).arg("-o").arg(&xml).output();
+    assert!(convert.unwrap().status.success());
+    let xml = std::fs::read_to_string(&xml).unwrap();
+    for word in ["explicit-visibility", "bounce 1", "gather/links", "display/vertex"] {
+        assert!(xml.contains(word), "no {word} in the capture");
+    }
+    assert!(!xml.contains("links/merge_hits"), "links were made before the frame");
 }
 
 /// Counts that F5 makes the viewer say: frames, pipelines, bytes on the device; one line each time.

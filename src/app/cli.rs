@@ -12,7 +12,8 @@ use super::console::Verbosity;
 use super::edits::Edit;
 use super::values::{
     CameraChoice, Output, SceneSource, parse_animation_seconds, parse_exposure, parse_field_of_view, parse_fraction,
-    parse_memory, parse_method, parse_method_or_auto, parse_pixel, parse_place, parse_size, parse_timeout, parse_turn,
+    parse_memory, parse_method, parse_method_or_auto, parse_pixel, parse_place, parse_size, parse_switch,
+    parse_timeout, parse_turn,
 };
 use crate::gpu::LossPoint;
 use crate::methods::Method;
@@ -55,6 +56,11 @@ pub struct Global {
     /// what needs more is refused before it is allocated [default: 8G on the host, all there is on the GPU]
     #[arg(long, global = true, value_name = "SIZE", value_parser = parse_memory)]
     pub max_memory: Option<u64>,
+    /// Take times of all passes, and label and mark them; what that costs is told by `linklight bench SCENE --vary
+    /// pass-times=off,on`
+    #[arg(long, global = true, value_name = "on|off", default_value = "on", action = ArgAction::Set,
+          value_parser = parse_switch)]
+    pub pass_times: bool,
     /// Say nothing but errors
     #[arg(long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,

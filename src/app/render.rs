@@ -436,6 +436,7 @@ pub(super) fn device_options(global: &Global) -> Options {
         max_memory_bytes: global.max_memory,
         timeout: global.gpu_timeout,
         lose_device_at: global.lose_device_at.clone(),
+        no_pass_times: !global.pass_times,
         ..Options::default()
     }
 }

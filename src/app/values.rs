@@ -215,6 +215,15 @@ pub fn parse_fraction(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A switch that is on by default.
+pub fn parse_switch(text: &str) -> Result<bool, String> {
+    match text {
+        "on" => Ok(true),
+        "off" => Ok(false),
+        _ => Err("expected on or off".to_owned()),
+    }
+}
+
 /// `--explain`.
 pub fn parse_pixel(text: &str) -> Result<UVec2, String> {
     let pixel =

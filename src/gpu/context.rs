@@ -1,6 +1,6 @@
 //! The front door of the GPU layer: one [`Context`] per device, from which everything is made.
 
-use super::device::{Device, Limits, MemoryUse, lock};
+use super::device::{CalibratedTimestamps, Device, Limits, MemoryUse, lock};
 use super::error::{Checked, GpuError};
 use super::features::OptionalFeatures;
 use super::image::{Image, ImageDescription, Sampler, SamplerDescription, TextureTable};
@@ -39,6 +39,8 @@ pub struct Options {
     pub skip_layouts: bool,
     /// Hash what every compute pass writes; see [`Context::take_hashes`].
     pub hash_passes: bool,
+    /// Take no times of passes, and neither label nor mark them: to measure what that costs.
+    pub no_pass_times: bool,
     /// Count invocations and primitives per pass where the device can.
     pub statistics: bool,
     /// Pretend to lack every optional feature.
@@ -220,11 +222,17 @@ impl Context {
 
     /// Device and host clock read together, where the device can.
     pub fn calibrate(&self) -> Option<ClockPair> {
-        let extension = self.device.calibrated_timestamps.as_ref()?;
         let domain = |time_domain| vk::CalibratedTimestampInfoKHR::default().time_domain(time_domain);
         let infos = [domain(vk::TimeDomainKHR::DEVICE), domain(vk::TimeDomainKHR::CLOCK_MONOTONIC)];
         // SAFETY: both domains are asked for by name; a device that lacks one answers with an error.
-        let (values, max_deviation_ns) = unsafe { extension.get_calibrated_timestamps(&infos) }.ok()?;
+        let (values, max_deviation_ns) = unsafe {
+            match &self.device.calibrated_timestamps {
+                Some(CalibratedTimestamps::Khr(extension)) => extension.get_calibrated_timestamps(&infos),
+                Some(CalibratedTimestamps::Ext(extension)) => extension.get_calibrated_timestamps(&infos),
+                None => return None,
+            }
+        }
+        .ok()?;
         let device_ns = (values[0] as f64 * self.device.limits.timestamp_period_ns) as u64;
         Some(ClockPair { device_ns, host_ns: values[1], max_deviation_ns })
     }

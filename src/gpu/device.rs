@@ -46,7 +46,7 @@ pub(super) struct Device {
     pub optional: OptionalFeatures,
     pub push_descriptor: khr::push_descriptor::Device,
     pub acceleration_structure: Option<khr::acceleration_structure::Device>,
-    pub calibrated_timestamps: Option<ext::calibrated_timestamps::Device>,
+    pub calibrated_timestamps: Option<CalibratedTimestamps>,
     pub device_fault: Option<ext::device_fault::Device>,
     pub buffer_marker: Option<amd::buffer_marker::Device>,
     dynamic_rendering: Option<khr::dynamic_rendering::Device>,
@@ -72,6 +72,12 @@ pub(super) struct Device {
     pub max_memory_bytes: u64,
     pub physical: vk::PhysicalDevice,
     pub instance: Arc<Instance>,
+}
+
+/// The same extension under both its names.
+pub(super) enum CalibratedTimestamps {
+    Khr(khr::calibrated_timestamps::Device),
+    Ext(ext::calibrated_timestamps::Device),
 }
 
 /// Bytes held under one owner: the part of an object's name before the first '/'.
@@ -186,9 +192,15 @@ impl Device {
                 acceleration_structure: optional
                     .ray_query
                     .then(|| khr::acceleration_structure::Device::new(&instance.raw, &raw)),
-                calibrated_timestamps: optional
-                    .calibrated_timestamps
-                    .then(|| ext::calibrated_timestamps::Device::new(&instance.raw, &raw)),
+                calibrated_timestamps: match () {
+                    () if has(khr::calibrated_timestamps::NAME) => {
+                        Some(CalibratedTimestamps::Khr(khr::calibrated_timestamps::Device::new(&instance.raw, &raw)))
+                    }
+                    () if has(ext::calibrated_timestamps::NAME) => {
+                        Some(CalibratedTimestamps::Ext(ext::calibrated_timestamps::Device::new(&instance.raw, &raw)))
+                    }
+                    () => None,
+                },
                 device_fault: optional.device_fault.then(|| ext::device_fault::Device::new(&instance.raw, &raw)),
                 buffer_marker: has(amd::buffer_marker::NAME)
                     .then(|| amd::buffer_marker::Device::new(&instance.raw, &raw)),

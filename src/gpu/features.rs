@@ -135,7 +135,7 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
             storage_16bit: f.storage_16bit.storage_buffer16_bit_access != 0,
             pipeline_statistics: core.pipeline_statistics_query != 0,
             memory_budget: has(ext::memory_budget::NAME),
-            calibrated_timestamps: has(ext::calibrated_timestamps::NAME),
+            calibrated_timestamps: has(khr::calibrated_timestamps::NAME) || has(ext::calibrated_timestamps::NAME),
             device_fault: f.device_fault.device_fault != 0,
             buffer_marker: has(amd::buffer_marker::NAME),
             sampler_anisotropy: core.sampler_anisotropy != 0,
@@ -150,7 +150,12 @@ pub(super) fn query(instance: &ash::Instance, physical: vk::PhysicalDevice) -> S
         };
         add(optional.ray_query, &RAY_QUERY_EXTENSIONS);
         add(optional.memory_budget, &[ext::memory_budget::NAME]);
-        add(optional.calibrated_timestamps, &[ext::calibrated_timestamps::NAME]);
+        let clocks: &[&CStr] = if has(khr::calibrated_timestamps::NAME) {
+            &[khr::calibrated_timestamps::NAME]
+        } else {
+            &[ext::calibrated_timestamps::NAME]
+        };
+        add(optional.calibrated_timestamps, clocks);
         add(optional.device_fault, &[ext::device_fault::NAME]);
         add(optional.buffer_marker, &[amd::buffer_marker::NAME]);
         add(optional.swapchain, &[khr::swapchain::NAME]);

@@ -156,7 +156,7 @@ impl Recorder<'_> {
     /// After the last pass of a submission.
     pub(super) fn mark_all_ended(&mut self) {
         let device = &self.context.device;
-        let Some(last) = self.timed.last() else { return };
+        let Some(last) = self.timed.last().filter(|last| last.marker > 0) else { return };
         if device.buffer_marker.is_some() || self.is_lost_here {
             return;
         }

@@ -373,6 +373,9 @@ impl<'c> Recorder<'c> {
             self.hazards.clear();
             let _ = self.hazards.needs_barrier(accesses);
         }
+        if self.context.options.no_pass_times {
+            return self.untimed(name, cost, threads, is_compute, body);
+        }
         let index = self.timed.len() as u32;
         let (pool, query) = ((index / PASSES_PER_POOL) as usize, index % PASSES_PER_POOL);
         let slot = match self.slot.as_mut().map(|slot| self.context.grow_slot(slot, pool).map(|()| slot)) {

@@ -3,8 +3,8 @@
 use super::buffer::RawBuffer;
 use super::device::lock;
 use super::error::{Checked, GpuError};
-use super::profiler::PassRecord;
-use super::recorder::{PASSES_PER_POOL, Recorder};
+use super::profiler::{Cost, PassRecord};
+use super::recorder::{PASSES_PER_POOL, Recorder, Timed};
 use super::staging::Way;
 use ash::vk;
 use std::sync::atomic::Ordering;
@@ -93,8 +93,25 @@ impl Recorder<'_> {
         Ok(std::mem::take(&mut self.staging))
     }
 
+    /// A command without label, queries and markers.
+    pub(super) fn untimed(
+        &mut self,
+        name: &'static str,
+        cost: Cost,
+        threads: u64,
+        is_compute: Option<bool>,
+        body: impl FnOnce(&mut Self),
+    ) {
+        body(self);
+        // What errors name.
+        self.timed.push(Timed { path: name.to_owned(), name, cost, threads, overlapped: false, marker: 0, is_compute });
+    }
+
     /// Reads the queries and appends one record per pass.
     fn collect(&mut self, last_pass: &str) -> Result<(), GpuError> {
+        if self.context.options.no_pass_times {
+            return Ok(());
+        }
         let device = &self.context.device;
         let Some(slot) = &self.slot else { return Ok(()) };
         let period = device.limits.timestamp_period_ns;

@@ -226,6 +226,7 @@ mod tests {
         gpu_timeout: None,
         crash_file: None,
         lose_device_at: None,
+        pass_times: true,
         quiet: false,
         verbose: 0,
     };

@@ -43,7 +43,7 @@ fn the_depth_of_a_change_is_what_it_needs() {
     assert_eq!(depth("", "--size 31x20"), Some(Depth::Display));
     assert_eq!(depth("--display final-gather", "--display final-gather --exposure 1"), Some(Depth::Display));
     assert_eq!(depth("", "--set rays_per_element=64"), Some(Depth::Method));
-    assert_eq!(depth("", "--seconds 1"), Some(Depth::Stage));
+    assert_eq!(depth("", "--seconds 1"), Some(Depth::Follow));
     assert_eq!(depth("--edit node:1.move=1,0,0", ""), Some(Depth::Stage));
     assert_eq!(depth("", "--method path-tracing"), Some(Depth::Stage), "it needs no elements");
 }
@@ -113,4 +113,95 @@ fn a_click_finds_what_the_pixel_shows() {
     assert!((surface.distance / seen - 1.0).abs() < 0.05, "{} m, the film has {seen} m", surface.distance);
     let scene = &engine.stage().unwrap().scene;
     assert_eq!(scene.materials[surface.material_index as usize].name, surface.material.name);
+}
+
+/// Frames of [`frames_with_everything_moving_allocate_nothing`]; LINKLIGHT_FRAMES=1000 for a longer film.
+const FRAMES: &str = "60";
+
+#[test]
+fn frames_with_everything_moving_allocate_nothing() {
+    const WARM_UP: u32 = 8;
+    let frames: u32 = std::env::var("LINKLIGHT_FRAMES").as_deref().unwrap_or(FRAMES).parse().unwrap();
+    let context = context();
+    for method in ["implicit-visibility --set bins=4", "path-tracing"] {
+        let mut engine = Engine::new(&context);
+        let (mut made, mut held) = ((0, 0), 0);
+        let mut last = Vec::new();
+        for frame in 0..frames {
+            let t = f64::from(frame % 97) / 48.5;
+            let (x, z) = (3.0 * t.cos(), 3.0 * t.sin());
+            let options = format!(
+                "builtin:dancer --method {method} --seconds {} --eye {x},1.5,{z} --look-at 0,1,0 --size 16x12 \
+                 --edit material:0.albedo={}",
+                0.04 * t,
+                0.3 + 0.1 * t
+            );
+            let film = engine.render(&request(&options), &Unwatched).unwrap();
+            let now = context.download(&film.direct).unwrap();
+            assert!(now != last, "{method}: frame {frame} shows something else");
+            last = now;
+            context.take_records();
+            let memory: u64 = context.memory_by_owner().values().map(|memory| memory.current_bytes).sum();
+            if frame == WARM_UP {
+                (made, held) = ((context.allocation_count(), context.pipeline_count()), memory);
+            } else if frame > WARM_UP {
+                let now = (context.allocation_count(), context.pipeline_count());
+                assert_eq!((now, memory), (made, held), "{method}: allocations, pipelines, bytes after frame {frame}");
+            }
+        }
+        println!("{method}: {frames} frames, {} allocations, {} pipelines, {held} bytes", made.0, made.1);
+    }
+    assert_eq!(context.validation_messages(), [""; 0]);
+}
+
+#[test]
+fn surfaces_that_move_are_followed_and_links_grow_young_again() {
+    let context = context();
+    let mut engine = Engine::new(&context);
+    let budget = "builtin:dancer --set rays_per_element=64 --set link_rays_per_frame=20000";
+    pixels(&context, &mut engine, budget);
+    assert_eq!(engine.link_age(), None);
+    let moved = format!("{budget} --seconds 0.7");
+    let first = pixels(&context, &mut engine, &moved);
+    assert_eq!(engine.link_age(), Some(1), "lit along the old links");
+    let aged = format!("{moved} --view link-age");
+    let frames = (0..64).take_while(|_| {
+        pixels(&context, &mut engine, &moved);
+        engine.link_age().is_some()
+    });
+    assert!((1..60).contains(&frames.count()), "they are made within some frames");
+    let last = pixels(&context, &mut engine, &moved);
+    assert!(last == pixels(&context, &mut Engine::new(&context), &moved) && last != first);
+    assert!(pixels(&context, &mut engine, &aged) != last, "ages are shown");
+    assert_eq!(context.validation_messages(), [""; 0]);
+}
+
+#[test]
+fn a_second_picture_is_compared_step_by_step() {
+    use crate::app::view::comparison::OtherJob;
+    let context = context();
+    let (mut ours, mut other) = (Engine::new(&context), Engine::new(&context));
+    let own = request("builtin:cornell-box --set rays_per_element=256 --spp 4");
+    let film = ours.render(&own, &Unwatched).unwrap();
+    let reference = request("builtin:cornell-box --method path-tracing");
+    let mut job = Some(OtherJob::new(own, reference));
+    let mut figures = Vec::new();
+    let mut before = None;
+    for _ in 0..5 {
+        let Some(next) = job.take() else { break };
+        let (compared, rest) =
+            next.work(&context, (&mut ours, &mut other), &film, before.as_ref(), &Unwatched).unwrap();
+        let compared = compared.unwrap();
+        figures.push((compared.spp, compared.relative_mse.unwrap(), compared.bounces.len()));
+        (before, job) = (Some(compared), rest);
+    }
+    // A picture, its bounces, and ever finer ones: noise falls, and light agrees.
+    assert_eq!(figures.iter().map(|f| (f.0, f.2)).collect::<Vec<_>>(), [(8, 0), (8, 2), (16, 2), (32, 2), (64, 2)]);
+    assert!(figures[4].1 < figures[0].1 && figures[4].1 > 0.0, "{figures:?}");
+    let compared = before.unwrap();
+    assert!((compared.mean_ratio.unwrap() - 1.0).abs() < 0.1, "{:?}", compared.mean_ratio);
+    for [own, other] in &compared.bounces {
+        assert!((own / other - 1.0).abs() < 0.2, "{:?}", compared.bounces);
+    }
+    assert!(context.download(&compared.difference.direct).unwrap().iter().any(|color| *color != Vec3::ZERO));
 }
