@@ -8,7 +8,7 @@ use crate::app::AppError;
 use crate::app::on_clusters::{ClustersShown, cluster_stage};
 use crate::display::direct::Canvas;
 use crate::display::irradiance_vector;
-use crate::gpu::shaders::types::HalfVectors;
+use crate::gpu::shaders::types::{HalfVectors, LeafElement};
 use crate::gpu::{Buffer, Context};
 use crate::methods::antiradiance::half;
 use crate::report::explanation::Light;
@@ -60,9 +60,8 @@ pub fn explain(
     Ok(names)
 }
 
-/// What a sample shows of the direct and indirect vectors of its leaf, and the leaf: on the host for diffuse surfaces
-/// of leaves that keep their light within their borders, as `display/irradiance_vector` computes it; by that pass for
-/// others.
+/// What a sample shows of the direct and indirect vectors of its leaf and of those that reach it, and the leaf: on the
+/// host for diffuse surfaces, as `display/irradiance_vector` computes it; by that pass for others.
 fn radiance(
     probe: &Probe<'_>,
     light: &ElementLight<'_>,
@@ -76,7 +75,7 @@ fn radiance(
     if leaf == u32::MAX {
         return Ok(([DVec3::ZERO; 2], leaf));
     }
-    if !seen.is_diffuse || light.per_vertex || light.reach > 0.0 {
+    if !seen.is_diffuse || light.per_vertex {
         let (film, at) = (probe.canvas.film, (probe.pixel.y * probe.canvas.film.width + probe.pixel.x) as usize);
         let indirect = probe.reflectance(seen, |recorder, view, weight| {
             irradiance_vector::add(recorder, *light, probe.canvas, view, weight);
@@ -84,17 +83,48 @@ fn radiance(
         let direct = context.download_range(&film.direct, at..at + 1)?[0].as_dvec3();
         return Ok(([direct, indirect], leaf));
     }
-    let element = context.download_range(light.leaves, leaf as usize..leaf as usize + 1)?[0];
-    let offset = seen.position - element.center;
-    let along = Vec2::new(offset.dot(element.axis_x), offset.dot(element.axis_y));
-    let uv = (0.5 + 0.5 * along / element.half_extent.truncate().max(Vec2::splat(1e-30))).clamp(Vec2::ZERO, Vec2::ONE);
+    let mut others = Vec::new();
+    if light.reach > 0.0 {
+        let row = context.download_range(light.neighbour_offsets, leaf as usize..leaf as usize + 2)?;
+        others = context.download_range(light.neighbours, row[0] as usize..row[1] as usize)?;
+    }
+    let mut sum = [[Vec3::ZERO; 3]; 2];
+    let mut weights = 0.0;
+    for leaf in [leaf].into_iter().chain(others) {
+        let element = context.download_range(light.leaves, leaf as usize..leaf as usize + 1)?[0];
+        let extent = element.half_extent;
+        let mut weight = weight_of(&element, seen.position, light.reach);
+        if weights == 0.0 {
+            weight = weight.max(1e-6 / (extent.x * extent.y).max(1e-30));
+        }
+        if weight <= 0.0 {
+            continue;
+        }
+        let offset = seen.position - element.center;
+        let along = Vec2::new(offset.dot(element.axis_x), offset.dot(element.axis_y));
+        let uv = (0.5 + 0.5 * along / extent.truncate().max(Vec2::splat(1e-30))).clamp(Vec2::ZERO, Vec2::ONE);
+        for (sum, buffer) in sum.iter_mut().zip([light.direct, light.indirect]) {
+            let vectors = at_place(context, light, buffer, leaf, uv)?;
+            sum.iter_mut().zip(vectors).for_each(|(sum, vector)| *sum += weight * vector);
+        }
+        weights += weight;
+    }
     let reflectance = seen.albedo / std::f32::consts::PI / probe.canvas.samples as f32;
-    let shine = |buffer| -> Result<DVec3, AppError> {
-        let vectors = at_place(context, light, buffer, leaf, uv)?;
-        let along = Vec3::from_array(vectors.map(|vector| vector.dot(seen.normal).max(0.0)));
-        Ok((reflectance * along).as_dvec3())
-    };
-    Ok(([shine(light.direct)?, shine(light.indirect)?], leaf))
+    let shines = sum.map(|vectors| {
+        let along = Vec3::from_array(vectors.map(|vector| (vector / weights).dot(seen.normal).max(0.0)));
+        (reflectance * along).as_dvec3()
+    });
+    Ok((shines, leaf))
+}
+
+/// As `lib/leaf_light.glsl` weighs a leaf at a place, 1/m2; `reach` in shorter half sides.
+fn weight_of(element: &LeafElement, place: Vec3, reach: f32) -> f32 {
+    let (offset, extent) = (place - element.center, element.half_extent);
+    let axes = [element.axis_x, element.axis_y, element.axis_x.cross(element.axis_y)];
+    let over = Vec3::from_array(axes.map(|axis| offset.dot(axis).abs())) - extent;
+    let limit = reach * extent.x.min(extent.y);
+    let share = if limit > 0.0 { (1.0 - over.max_element() / limit).clamp(0.0, 1.0) } else { 0.0 };
+    share / (4.0 * extent.x * extent.y).max(1e-30)
 }
 
 /// The irradiance vectors of the three channels at a place of a leaf, W/m2.
