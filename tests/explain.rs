@@ -47,6 +47,8 @@ fn every_method_and_display_is_explained_and_the_parts_make_the_pixel() {
         ("--method surface-shadow-maps --display lightmap --set atlas_resolution=32 --set keep_maps=false", 1e-4, 8),
         ("--method face-cluster --diffuse", 1e-4, 1),
         ("--method face-cluster", 1e-4, 1),
+        ("--method explicit-visibility --display final-gather", 1e-4, 20),
+        ("--method surface-shadow-maps --set atlas_resolution=32 --set keep_maps=false", 1e-4, 20),
         ("--method path-tracing", 1e-6, 1),
     ] {
         let scene = SCENE.split(" --set").next().unwrap();

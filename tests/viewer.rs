@@ -351,7 +351,7 @@ fn nothing_done_at_random_leaves_a_trace() {
     for _ in 0..actions {
         let (x, y) = (20 + random.below(100), 20 + random.below(60));
         let window = view.window.clone();
-        match random.below(9) {
+        match random.below(10) {
             0 if method < 2 => {
                 view.xdotool("key Next");
                 method += 1;
@@ -369,6 +369,7 @@ fn nothing_done_at_random_leaves_a_trace() {
             5 => view.xdotool("key Escape"),
             6 => view.xdotool(&format!("windowunmap --sync {window} windowmap --sync {window} windowfocus {window}")),
             7 => view.xdotool(&format!("mousemove {x} {y} click 4")),
+            8 => view.xdotool(&format!("mousemove {x} {y} click 1")),
             _ => view.xdotool(&format!(
                 "mousemove {x} {y} mousedown 1 mousemove {} {y} mousemove {y} {x} mouseup 1",
                 x + random.below(30)

@@ -29,4 +29,6 @@ float visibility(vec3 origin, vec3 target, uint leaf)
 
 #include "display/final_gather.glsl"
 
+void keep(Arrival arrival, float free) {}
+
 void main() { gather_pixel(); }

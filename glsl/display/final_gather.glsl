@@ -91,12 +91,16 @@ Arrival environment_arrival(uvec4 random, float share)
 }
 
 vec3 direct_sum, indirect_sum, lost_sum;     // W m^-2 sr^-1
+uint gathered_pixel;
+
+void keep(Arrival arrival, float free);
 
 void take(Arrival arrival, float free)
 {
     direct_sum += free * arrival.direct;
     indirect_sum += free * arrival.indirect;
     lost_sum += free * arrival.lost;
+    keep(arrival, free);
     start_showing(shown_luminance + free * luminance(arrival.direct + arrival.indirect));
 }
 
@@ -119,6 +123,7 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
     start_showing(luminance(direct[index] + indirect[index]) / samples_so_far);
 
     direct_sum = indirect_sum = lost_sum = vec3(0.0);
+    gathered_pixel = index;
     uint node = 0, visited = 0, cut = 0, environment_taken = 0;
     while (true) {
         // Up to the next arrival that would bring light and needs a ray: threads in lockstep cast theirs together.

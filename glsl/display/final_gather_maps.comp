@@ -46,4 +46,6 @@ float visibility(vec3 origin, vec3 target, uint leaf)
     return is_hit(traverse(Ray(origin, 0.0, target - origin, 1.0), true)) ? 0.0 : 1.0;
 }
 
+void keep(Arrival arrival, float free) {}
+
 void main() { gather_pixel(); }

@@ -20,4 +20,6 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     return false;
 }
 
+void keep(Arrival arrival, float free) {}
+
 void main() { gather_pixel(); }

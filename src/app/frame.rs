@@ -22,7 +22,7 @@ use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
 use crate::methods::surface_shadow_maps::SurfaceShadowMaps;
 use crate::stages::film::Film;
-use crate::stages::sender_tree::{VertexElements, VertexLeaves};
+use crate::stages::sender_tree::{SenderTree, VertexElements, VertexLeaves};
 use crate::stages::work::Watch;
 use glam::UVec2;
 use serde_json::Value;
@@ -56,6 +56,16 @@ pub struct VertexShown {
     pub(super) gather: Option<Gather>,
     /// Where flat patches are drawn.
     pub(super) splat_sums: Option<SplatSums>,
+}
+
+/// A final gather, and what it draws from.
+pub(super) struct Gathering<'a> {
+    pub display: &'a mut FinalGather,
+    pub tree: &'a SenderTree,
+    pub shadow_maps: &'a ShadowMaps,
+    pub g_buffer: &'a GBuffer,
+    /// Surface shadow maps may tell what is seen.
+    pub has_maps: bool,
 }
 
 /// The final gather, and the tree that the method's vertices fill.
@@ -198,6 +208,20 @@ impl Method {
             }
             Self::OnTexels(shown) => shown.follow(context, request, stage, watch),
             Self::OnClusters(_) => Ok(false),
+        }
+    }
+
+    /// The final gather that shows it, if one does.
+    pub(super) fn gathering(&mut self) -> Option<Gathering<'_>> {
+        match self {
+            Self::PathTracing(_) => None,
+            Self::OnElements(shown) => {
+                let VertexShown { shadow_maps, g_buffer, gather, .. } = &mut **shown;
+                let Gather { leaves, display } = gather.as_mut()?;
+                Some(Gathering { display, tree: &leaves.tree, shadow_maps, g_buffer, has_maps: false })
+            }
+            Self::OnTexels(shown) => shown.gathering(),
+            Self::OnClusters(shown) => shown.gathering(),
         }
     }
 

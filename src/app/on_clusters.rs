@@ -2,7 +2,7 @@
 
 use super::AppError;
 use super::cli::Display;
-use super::frame::{check_visibility, gather_samples};
+use super::frame::{Gathering, check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::direct::Canvas;
@@ -124,6 +124,13 @@ impl Gather {
 }
 
 impl ClustersShown {
+    /// As [`super::frame::Method::gathering`].
+    pub(super) fn gathering(&mut self) -> Option<Gathering<'_>> {
+        let Self { shadow_maps, g_buffer, gather, .. } = self;
+        let Gather { leaves, display, .. } = gather.as_mut()?;
+        Some(Gathering { display, tree: &leaves.tree, shadow_maps, g_buffer, has_maps: false })
+    }
+
     pub fn prepare(
         context: &Context,
         request: &RenderRequest,

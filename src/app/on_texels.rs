@@ -2,7 +2,7 @@
 
 use super::AppError;
 use super::cli::Display;
-use super::frame::{check_visibility, gather_samples};
+use super::frame::{Gathering, check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::direct::Canvas;
@@ -11,11 +11,12 @@ use crate::display::g_buffer::GBuffer;
 use crate::display::lightmap::{self, Lightmap, TexelLight};
 use crate::display::shadow_maps::ShadowMaps;
 use crate::gpu::Context;
+use crate::methods::pick::seen_triangle;
 use crate::methods::surface_shadow_maps::{self, Lit, Report, SurfaceShadowMaps};
 use crate::report::image::write_exr;
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
-use glam::Vec3;
+use glam::{UVec2, Vec3};
 use std::path::Path;
 
 /// Surface shadow maps, ready to be shown.
@@ -105,6 +106,33 @@ impl TexelsShown {
         self.method.place(context, &of_scene).map_err(AppError::failed)
     }
 
+    /// A picture of the atlas or of a map, in place of the scene.
+    fn flat_frame(&self, context: &Context, stage: &Stage, film: &Film) -> Result<(), AppError> {
+        let size = UVec2::new(film.width, film.height);
+        let positions = context.download(&stage.world.positions)?;
+        let triangles = context.download(&stage.world.triangles)?;
+        let texel = self.method.picked_texel(|pixel| {
+            let seen = seen_triangle(&positions, &triangles, &stage.view, pixel, size)?;
+            let ray = stage.view.ray(pixel.as_vec2() + 0.5, size);
+            Some((ray.origin + seen.distance * ray.direction, seen))
+        });
+        let Some(flat) = self.method.flat_picture(texel) else { return Ok(()) };
+        let mut recorder = context.recorder("frame")?;
+        for buffer in [&film.direct, &film.indirect, &film.albedo, &film.normal] {
+            recorder.fill(buffer, 0);
+        }
+        recorder.fill(&film.depth, 0);
+        recorder.submit()?;
+        Ok(context.write(&film.direct, &flat.fitted(size))?)
+    }
+
+    /// As [`super::frame::Method::gathering`].
+    pub(super) fn gathering(&mut self) -> Option<Gathering<'_>> {
+        let Self { method, shadow_maps, g_buffer, shown } = self;
+        let Shown::FinalGather(display) = shown else { return None };
+        Some(Gathering { display, tree: &method.tree, shadow_maps, g_buffer, has_maps: method.maps.is_some() })
+    }
+
     /// What shows the atlas, where it is shown by a filter over its texels.
     pub fn lightmap(&self) -> Option<LightmapShown<'_>> {
         let Self { method, shadow_maps, g_buffer, shown } = self;
@@ -145,6 +173,9 @@ impl TexelsShown {
         watch: &dyn Watch,
     ) -> Result<(), AppError> {
         let (world, method) = (&stage.world, &self.method);
+        if method.settings().show != surface_shadow_maps::Shown::Light {
+            return self.flat_frame(context, stage, film);
+        }
         // A final gather adds a bounce of its own; a lightmap shows what there is.
         let gathers = matches!(self.shown, Shown::FinalGather(_));
         self.solve(context, stage, if gathers { request.bounces.saturating_sub(1) } else { request.bounces })?;

@@ -58,7 +58,14 @@ pub fn resolve(args: &mut PictureArgs) -> Result<(), AppError> {
     let display = displays(args.method).first().map(|&default| args.display.unwrap_or(default));
     // A gather shows no colours of elements, and nothing else shows cuts.
     let (views, of) = match display {
-        Some(Display::FinalGather) => (of_final_gather(), "--display final-gather"),
+        Some(Display::FinalGather) => {
+            let mut views = of_final_gather();
+            // Pictures of the atlas need no display.
+            if args.method.key == "surface-shadow-maps" {
+                views.extend(of_method(args.method));
+            }
+            (views, "--display final-gather")
+        }
         _ => (of_method(args.method), args.method.key),
     };
     if let Some(view) = views.iter().find(|view| view.value.name == name) {
@@ -198,7 +205,18 @@ mod tests {
         let mut text = Vec::new();
         list(&mut text).unwrap();
         let text = String::from_utf8(text).unwrap();
-        for name in ["charts", "bins", "antiradiance", "residual", "elements", "cut-size", "link-age", "bad-values"] {
+        for name in [
+            "charts",
+            "bins",
+            "antiradiance",
+            "residual",
+            "elements",
+            "cut-size",
+            "link-age",
+            "bad-values",
+            "depth-map",
+            "traversal-order",
+        ] {
             assert!(text.contains(&format!("--view {name} ")), "{name} in\n{text}");
         }
     }

@@ -14,7 +14,7 @@ use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
 use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display as passes;
-use crate::gpu::shaders::types::GatherCount;
+use crate::gpu::shaders::types::{GatherCount, KeptSender};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::report::tonemap::{Operator, ToneSettings};
 use crate::scene::camera::View;
@@ -25,7 +25,11 @@ use crate::stages::sender_tree::{NodeLayout, Representative, SenderTree, TreeOpt
 use crate::stages::surface_maps::PlacedMaps;
 use crate::stages::trace::Tracer;
 use crate::stages::world::World;
+use bytemuck::Zeroable as _;
 use glam::{UVec2, Vec3};
+
+/// Of [`KeptSender::leaf`]: the environment. The same constant stands in `lib/sender_tree.glsl`.
+pub const NO_SENDER: u32 = u32::MAX;
 
 crate::choice! {
     /// What decides whether a sender is seen.
@@ -91,6 +95,7 @@ pub struct FinalGather {
     seed: u32,
     /// One per pixel, row by row; means over the samples.
     pub counts: Buffer<GatherCount>,
+    kept: Option<Buffer<KeptSender>>,
 }
 
 /// Means over all pixels that gathered.
@@ -145,7 +150,30 @@ impl FinalGather {
         seed: u32,
     ) -> Result<Self, GpuError> {
         let counts = context.buffer("final_gather/counts", width as usize * height as usize)?;
-        Ok(Self { settings, tone, seed, counts })
+        Ok(Self { settings, tone, seed, counts, kept: None })
+    }
+
+    /// From now on `pixel` (row by row) keeps what it takes from each sender, at most so many; `None` ends that. Such a
+    /// gather sees by our own rays, or through everything.
+    pub fn keep(&mut self, context: &Context, pixel: Option<u32>, most: usize) -> Result<(), GpuError> {
+        self.kept = None;
+        if let Some(leaf) = pixel {
+            let mut head = vec![KeptSender::zeroed(); most + 1];
+            head[0].leaf = leaf;
+            self.kept = Some(context.upload("final_gather/kept", &head)?);
+        }
+        Ok(())
+    }
+
+    /// What was kept since then.
+    pub fn kept(&self, context: &Context) -> Result<Vec<KeptSender>, GpuError> {
+        let Some(kept) = &self.kept else { return Ok(Vec::new()) };
+        let count = context.download_range(kept, 0..1)?[0].sample_index as usize;
+        if count >= kept.len() {
+            let most = kept.len() - 1;
+            return Err(GpuError::Refused(format!("a pixel took light {count} times, {most} are kept; lower --spp")));
+        }
+        context.download_range(kept, 1..count + 1)
     }
 
     /// Adds sample `sample` to `film`; the first clears it.
@@ -228,6 +256,19 @@ impl FinalGather {
         let sees_through = settings.gather_visibility == Visibility::None;
         let by_maps = matches!(settings.gather_visibility, Visibility::Auto | Visibility::Maps);
         let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = from.tracer;
+        if let Some(kept) = &self.kept {
+            let alpha_test = surfaces.has_holes;
+            gather!(
+                FinalGatherExplain,
+                FinalGatherExplainParams,
+                surfaces,
+                passes::FinalGatherExplainConstants { alpha_test, sees_through, compact },
+                bvh_nodes: from.bvh.nodes(),
+                bvh_triangles: from.bvh.triangles(),
+                kept: kept
+            );
+            return;
+        }
         match (from.tracer, from.maps.filter(|_| by_maps)) {
             (_, Some(PlacedMaps { maps, leaf_places, frame, moving: Some(moving), .. })) => gather!(
                 FinalGatherMoving,

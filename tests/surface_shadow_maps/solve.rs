@@ -4,7 +4,8 @@ use crate::common::TestContext;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use glam::Vec3;
-use linklight::methods::surface_shadow_maps::{Settings, TexelVisibility};
+use linklight::methods::pick::Pick;
+use linklight::methods::surface_shadow_maps::{Settings, Shown, TexelVisibility};
 use linklight::scene::environment::Environment;
 use linklight::scene::{LightKind, Material};
 use std::f32::consts::PI;
@@ -24,6 +25,8 @@ const SMALL: Settings = Settings {
     tree_layout: linklight::stages::sender_tree::NodeLayout::Wide,
     tree_normal_weight: 0.25,
     keep_maps: false,
+    show: Shown::Light,
+    pick: Pick::Nothing,
 };
 
 fn one_sided(albedo: f32) -> Material {

@@ -1,4 +1,4 @@
-//! Pixels whose light no table keeps apart: frames of fewer bounces, and what each bounce adds.
+//! Pixels of path tracing, which keeps no light apart: frames of fewer bounces, and what each bounce adds.
 
 use glam::UVec2;
 
@@ -20,15 +20,12 @@ pub fn explain(
     let mut before = [glam::DVec3::ZERO; 2];
     for bounces in 0..=request.bounces {
         let fewer = RenderRequest { bounces, lightmap: None, ..request.clone() };
-        if matches!(method, Method::PathTracing(_)) {
-            method.show(context, &fewer, stage)?;
-        }
+        method.show(context, &fewer, stage)?;
         method.frame(context, &fewer, stage, &film, watch)?;
         let now = frame.value(&film, pixel)?.map(glam::Vec3::as_dvec3);
-        let source = match (bounces, matches!(method, Method::PathTracing(_))) {
-            (0, _) => "emission, lights and environment".to_owned(),
-            (_, true) => format!("paths of {} reflections", bounces + 1),
-            (_, false) => "the final gather's senders".to_owned(),
+        let source = match bounces {
+            0 => "emission, lights and environment".to_owned(),
+            bounces => format!("paths of {} reflections", bounces + 1),
         };
         for (light, (now, before)) in [Light::Direct, Light::Indirect].into_iter().zip(now.into_iter().zip(before)) {
             add(parts, (light, Some(bounces), source.clone(), String::new()), now - before);

@@ -6,7 +6,8 @@
 //! | [`elements`] | light on elements, link by link |
 //! | [`texels`] | light on the texels of an atlas |
 //! | [`clusters`] | vector irradiance of face clusters |
-//! | [`bounces`] | what no method keeps apart: frames of fewer bounces |
+//! | [`gathered`] | the cut of a final gather |
+//! | [`bounces`] | path tracing: frames of fewer bounces |
 //!
 //! Weights come from the passes that drew the picture, light from the tables that the method gathered along its links;
 //! both are multiplied and summed up anew on the host, and held to the pixel.
@@ -16,6 +17,7 @@
 mod bounces;
 mod clusters;
 mod elements;
+mod gathered;
 mod probe;
 mod texels;
 
@@ -65,7 +67,8 @@ pub fn explain(frame: Frame<'_>, method: &mut Method, pixel: UVec2) -> Result<Ex
         Method::OnElements(shown) if shown.gather.is_none() => elements::explain(frame, shown, pixel, &mut parts)?,
         Method::OnTexels(shown) if shown.lightmap().is_some() => texels::explain(frame, shown, pixel, &mut parts)?,
         Method::OnClusters(shown) if shown.gather.is_none() => clusters::explain(frame, shown, pixel, &mut parts)?,
-        _ => bounces::explain(frame, method, pixel, &mut parts)?,
+        Method::PathTracing(_) => bounces::explain(frame, method, pixel, &mut parts)?,
+        _ => gathered::explain(frame, method, pixel, &mut parts)?,
     };
     let entry = |((light, bounce, source, receiver), (count, radiance))| Entry {
         light,

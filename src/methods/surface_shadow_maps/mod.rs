@@ -25,9 +25,13 @@
 
 mod gathering;
 mod moving;
+mod views;
+
+pub use views::{FlatPicture, Shown};
 
 use crate::gpu::shaders::methods::surface_shadow_maps as passes;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::methods::pick::Pick;
 use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
 use crate::scene::atlas::{Atlas, AtlasError};
@@ -88,6 +92,10 @@ crate::settings! {
         tree_layout: NodeLayout = NodeLayout::Wide, paper "compact";
         /// How much a difference of normals counts beside distance when the tree is cut.
         tree_normal_weight: f32 = 0.25, range 0.0..=10.0, paper "0: by position alone";
+        /// What the picture shows.
+        show: Shown = Shown::Light, paper "Figs. 6 and 7";
+        /// Whose depth map is shown.
+        pick: Pick = Pick::Nothing, paper "not given";
         /// Keep the maps on disk, in the user's cache folder.
         keep_maps: bool = true, paper "not given";
     }
