@@ -231,6 +231,10 @@ fn another_method_stands_beside_the_picture_and_differences_are_shown() {
     assert!(error > 0.0 && error < 0.5, "relative MSE {error}");
     let (width, height, pixels) = screen(&view);
     assert_eq!((width, height), (320, 120), "two pictures side by side");
+    if let Ok(kept) = std::env::var("LINKLIGHT_KEEP_SHOTS") {
+        let path = Path::new(&kept).join("side-by-side.png");
+        image::save_buffer(path, &pixels, width, height, image::ColorType::Rgb8).unwrap();
+    }
     // Both halves show the room, one of them noisy.
     let half = |first: u32| -> Vec<f64> {
         let rows = (0..height).flat_map(|y| (first..first + 160).map(move |x| (y * 320 + x) as usize));
@@ -240,10 +244,6 @@ fn another_method_stands_beside_the_picture_and_differences_are_shown() {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let off = left.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f64>() / left.len() as f64;
     assert!(mean(&left) > 30.0 && (mean(&left) / mean(&right) - 1.0).abs() < 0.2 && off < 25.0 && off > 0.1, "{off}");
-    if let Ok(kept) = std::env::var("LINKLIGHT_KEEP_SHOTS") {
-        let path = Path::new(&kept).join("side-by-side.png");
-        image::save_buffer(path, &pixels, width, height, image::ColorType::Rgb8).unwrap();
-    }
     let shot = view.shoot(1);
     view.close();
     // What is written is the picture itself.

@@ -65,8 +65,11 @@ impl Stage {
         Ok(recorder.submit()?)
     }
 
-    /// Moves the scene to the time of `request`; what is on the device moves there.
-    pub fn follow(&mut self, context: &Context, request: &RenderRequest) -> Result<(), AppError> {
+    /// Moves the scene to the time of `request`; what is on the device moves there. False where nothing is animated.
+    pub fn follow(&mut self, context: &Context, request: &RenderRequest) -> Result<bool, AppError> {
+        if self.scene.clips.is_empty() {
+            return Ok(false);
+        }
         self.pose = Pose::at(&self.scene, request.seconds);
         let vertices = deform::world_vertices(&self.geometry, &self.pose);
         let bounds = vertices.bounds().filter(|[low, high]| low.is_finite() && high.is_finite());
@@ -85,7 +88,7 @@ impl Stage {
         if self.bvh.needs_rebuild(context, WORST_REFIT).map_err(AppError::failed)? {
             self.bvh.rebuild(context, &self.world.positions).map_err(AppError::failed)?;
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Places a scene that was loaded, and edited, before.
@@ -132,6 +135,12 @@ impl Stage {
         let world = time_line.span("upload", || {
             World::new(context, &scene, &geometry, &pose, &environment.environment, request.diffuse)
         })?;
+        if !scene.clips.is_empty() {
+            // Where the device places them, to the bit: as a later pose will.
+            let mut recorder = context.recorder("world")?;
+            bvh.refit(&mut recorder, &world.positions).map_err(AppError::failed)?;
+            recorder.submit()?;
+        }
         tracing::debug!(
             "{} elements, {} triangles, {} lights",
             geometry.vertex_count(),

@@ -102,7 +102,7 @@ fn color_of(direct: Vec3, indirect: Vec3, mean: f32) -> Vec3 {
     } else if both.iter().any(|value| value.min_element() < 0.0) {
         Vec3::new(0.0, 0.2, 1.0)
     } else {
-        let shown = (direct + indirect).element_sum() / (3.0 * mean.max(f32::MIN_POSITIVE));
+        let shown = ((direct + indirect).element_sum() / (3.0 * mean.max(1e-30))).min(1e6);
         Vec3::splat(0.25 * shown / (1.0 + shown))
     }
 }

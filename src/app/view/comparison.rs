@@ -11,6 +11,7 @@ use glam::Vec3;
 
 use super::engine::Engine;
 use crate::app::AppError;
+use crate::app::cli::Display;
 use crate::app::render::RenderRequest;
 use crate::gpu::Context;
 use crate::methods::{METHODS, Method};
@@ -25,7 +26,9 @@ const FIRST_SPP: u32 = 8;
 const FINEST_SPP: u32 = 8192;
 /// Width of the pictures whose light is told by bounce, pixels, and their samples.
 const BOUNCE_WIDTH: u32 = 64;
-const BOUNCE_PATHS: u32 = 32;
+const BOUNCE_PATHS: u32 = 64;
+const BOUNCE_SAMPLES: u32 = 16;
+const BOUNCE_GATHERS: u32 = 2;
 /// Relative error that the difference shows as bright as it can.
 const BRIGHTEST: f32 = 1.0;
 
@@ -195,7 +198,11 @@ fn bounce_means(
 ) -> Result<Vec<f64>, AppError> {
     let width = request.width.min(BOUNCE_WIDTH);
     let height = (request.height * width / request.width.max(1)).max(1);
-    let spp = if request.method.key == "path-tracing" { BOUNCE_PATHS } else { 1 };
+    let spp = match request.display {
+        None => BOUNCE_PATHS,
+        Some(Display::FinalGather) => BOUNCE_GATHERS,
+        Some(_) => BOUNCE_SAMPLES,
+    };
     let mut sums = Vec::new();
     for bounces in 0..=request.bounces {
         let small = RenderRequest { width, height, spp, bounces, ..request.clone() };

@@ -233,10 +233,8 @@ impl<'c> Engine<'c> {
             }
         }
         self.edits.clone_from(&request.edits);
-        let has_moved = self.seconds != request.seconds && depth < Depth::Stage;
-        if has_moved {
-            stage.follow(self.context, request)?;
-        }
+        let is_later = self.seconds != request.seconds && depth < Depth::Stage;
+        let has_moved = is_later && stage.follow(self.context, request)?;
         self.seconds = request.seconds;
         if let Some(method) = &mut self.method
             && (has_moved || method.link_age().is_some())

@@ -126,7 +126,7 @@ fn frames_with_everything_moving_allocate_nothing() {
     for method in ["implicit-visibility --set bins=4", "path-tracing"] {
         let mut engine = Engine::new(&context);
         let (mut made, mut held) = ((0, 0), 0);
-        let mut last = Vec::new();
+        let mut last = (Vec::new(), Vec::new());
         for frame in 0..frames {
             let t = f64::from(frame % 97) / 48.5;
             let (x, z) = (3.0 * t.cos(), 3.0 * t.sin());
@@ -137,7 +137,7 @@ fn frames_with_everything_moving_allocate_nothing() {
                 0.3 + 0.1 * t
             );
             let film = engine.render(&request(&options), &Unwatched).unwrap();
-            let now = context.download(&film.direct).unwrap();
+            let now = (context.download(&film.direct).unwrap(), context.download(&film.depth).unwrap());
             assert!(now != last, "{method}: frame {frame} shows something else");
             last = now;
             context.take_records();
