@@ -179,6 +179,20 @@ fn a_reader_that_goes_away_is_no_error() {
 }
 
 #[test]
+fn what_needs_more_memory_than_allowed_is_refused() {
+    let folder = Pictures::new();
+    let output = folder.text("out.png");
+    let render =
+        |scene: &str, options: &[&str]| linklight(&[&["render", scene, "-o", &output, "--quiet"], options].concat());
+    render("builtin:gallery?triangles=1500000", &["--max-memory", "64M"]).fails(1, "raise --max-memory");
+    render("builtin:cornell-box", &["--elements", "5000000", "--max-memory", "64M"]).fails(1, "raise --max-memory");
+    // What is too large for the device alone, and would take gigabytes.
+    render("builtin:furnace", &["--size=8192x8192", "--max-memory", "96M"]).fails(1, "--max-memory");
+    render("builtin:furnace", &["--max-memory", "9"]).fails(2, "at least 1M");
+    assert!(folder.names().is_empty(), "nothing is written");
+}
+
+#[test]
 fn without_a_driver_the_exit_code_is_3_and_nothing_is_written() {
     let folder = Pictures::new();
     let without_driver = |arguments: &[&str]| {

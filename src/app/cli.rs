@@ -52,6 +52,12 @@ pub struct Global {
     /// what is told of it
     #[arg(long, global = true, value_name = "PASS[@N]")]
     pub lose_device_at: Option<LossPoint>,
+    /// Put a full barrier before every pass: if the picture changes by it, a hazard was missed
+    #[arg(long, global = true)]
+    pub full_barriers: bool,
+    /// Pretend that the GPU offers the least that is enough: 16 MiB in one storage buffer, nothing optional
+    #[arg(long, global = true)]
+    pub small_device: bool,
     /// Most memory that a scene and what is made of it may take, such as 512M or 12G, on the host and again on the GPU;
     /// what needs more is refused before it is allocated [default: 8G on the host, all there is on the GPU]
     #[arg(long, global = true, value_name = "SIZE", value_parser = parse_memory)]

@@ -28,6 +28,8 @@ use crate::report::write::{check_writable, write_text};
 use crate::scene::environment::load::EnvironmentSource;
 use crate::stages::film::Film;
 
+/// Largest storage buffer of the device that `--small-device` pretends to have, bytes.
+const SMALL_STORAGE_BYTES: u64 = 16 << 20;
 /// Samples per pixel of path-tracing: paths.
 const DEFAULT_SPP: u32 = 64;
 /// Samples per pixel of a display stage: places within the pixel, for smooth edges.
@@ -433,6 +435,9 @@ pub(super) fn device_options(global: &Global) -> Options {
         gpu: global.gpu.clone(),
         validation: global.validate,
         pipeline_cache: pipeline_cache(),
+        full_barriers: global.full_barriers,
+        no_optional_features: global.small_device,
+        max_storage_buffer_bytes: global.small_device.then_some(SMALL_STORAGE_BYTES),
         max_memory_bytes: global.max_memory,
         timeout: global.gpu_timeout,
         lose_device_at: global.lose_device_at.clone(),

@@ -7,6 +7,7 @@ use linklight::files::{FileFaults, PLANTED};
 use linklight::gpu::{Failure, FaultInjection};
 use linklight::methods::METHODS;
 use linklight::report::image;
+use linklight::report::profile::Profile;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -86,6 +87,38 @@ fn renders_survive_vulkan_calls_that_fail() {
             assert_eq!(faults.complaints(), Vec::<String>::new(), "{what}");
         }
         println!("  {:<20} {} of {} calls failed, {:.1?}", method.key, chosen.len(), calls.len(), start.elapsed());
+    }
+}
+
+#[test]
+fn renders_end_where_the_device_is_lost() {
+    if !is_apart("renders::renders_end_where_the_device_is_lost") {
+        return;
+    }
+    let _turn = TURN.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (output, profile, crash) = (path("out.exr"), path("profile.json"), path("crash.json"));
+    let faults = FaultInjection::start();
+    for method in METHODS {
+        let options = [&["-o", &output, "--profile", &profile], elements(method.key)].concat();
+        render(method.key, &options).unwrap_or_else(|error| panic!("{}: {error}", method.key));
+        let mut passes: Vec<String> =
+            Profile::read(Path::new(&profile)).unwrap().passes.into_iter().map(|pass| pass.name).collect();
+        passes.sort();
+        passes.dedup();
+        let chosen = sample(passes.len(), 2);
+        for pass in chosen.iter().map(|at| &passes[*at as usize - 1]) {
+            [&output, &profile, &crash].into_iter().for_each(|path| drop(std::fs::remove_file(path)));
+            faults.fail(0, Failure::DeviceLost);
+            let lose = ["--validate", "--lose-device-at", pass, "--crash-file", &crash];
+            let error = render(method.key, &[&options, &lose[..]].concat()).expect_err(pass);
+            let what = format!("{}, lost in {pass}", method.key);
+            assert!(error.exit_code() == 1 && error.to_string().contains(pass.as_str()), "{what}: {error}");
+            assert_eq!(names(folder.path()), ["crash.json"], "{what}");
+            assert_eq!(faults.complaints(), Vec::<String>::new(), "{what}");
+        }
+        println!("  {:<20} lost in {} of {} passes", method.key, chosen.len(), passes.len());
     }
 }
 

@@ -10,6 +10,7 @@
 //! `LINKLIGHT_FUZZ_TARGET=gltf` takes one kind of input alone, and with `LINKLIGHT_FUZZ_FIRST=INDEX` it starts at that
 //! execution: what a finding prints repeats it. An input that was mended goes to `regressions/TARGET-what-is-wrong`.
 
+mod bombs;
 mod files;
 mod gltf_inputs;
 mod mutate;

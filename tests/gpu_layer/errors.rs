@@ -2,7 +2,7 @@
 
 use crate::common::TestContext;
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
-use linklight::gpu::{Format, GpuError, ImageDescription, SamplerDescription, Shape};
+use linklight::gpu::{Format, GpuError, ImageDescription, Options, SamplerDescription, Shape};
 
 const TEXEL: ImageDescription<'_> = ImageDescription {
     name: "test/texel",
@@ -73,6 +73,26 @@ fn memory_beyond_the_heap_is_refused_with_numbers() {
     }
     assert!(error.to_string().contains("test/vast"), "{error}");
     assert!(context.buffer::<u32>("test/small", 16).is_ok(), "the context goes on working");
+}
+
+#[test]
+fn memory_beyond_what_is_allowed_is_refused_with_numbers() {
+    let context = TestContext::with(Options { max_memory_bytes: Some(1 << 20), ..Options::default() });
+    let half = context.buffer::<u8>("test/half", 600 << 10).unwrap();
+    let error = context.buffer::<u8>("test/more", 600 << 10).err().unwrap();
+    match &error {
+        GpuError::OutOfMemory { name, bytes, available, .. } => {
+            assert_eq!(
+                (name.as_str(), *bytes >= 600 << 10, *available <= 424 << 10),
+                ("test/more", true, true),
+                "{error}"
+            );
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(error.to_string().contains("--max-memory"), "{error}");
+    drop(half);
+    assert!(context.buffer::<u8>("test/more", 600 << 10).is_ok(), "what is given back can be taken again");
 }
 
 #[test]

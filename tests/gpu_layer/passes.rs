@@ -114,6 +114,18 @@ fn a_draw_of_nothing_still_clears() {
     }
 }
 
+/// Every device allows 128 bytes of push constants and, of those we run on, 256 invocations a workgroup.
+#[test]
+fn every_program_keeps_to_what_all_devices_allow() {
+    let programs = linklight::gpu::shaders::PROGRAMS;
+    assert!(programs.len() > 50, "{} programs", programs.len());
+    for program in programs {
+        assert!(program.push_constant_bytes <= 128, "{}: {} bytes", program.name, program.push_constant_bytes);
+        let invocations: u32 = program.workgroup.iter().product();
+        assert!(invocations <= 256, "{}: {invocations} invocations", program.name);
+    }
+}
+
 #[test]
 fn a_device_without_optional_features_does_the_same_work() {
     let data: Vec<u32> = {

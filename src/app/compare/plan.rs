@@ -161,6 +161,8 @@ impl Plan<'_> {
         let own = self.global.clone();
         let global = Global {
             validate: own.validate || cli.global.validate,
+            full_barriers: own.full_barriers || cli.global.full_barriers,
+            small_device: own.small_device || cli.global.small_device,
             max_memory: cli.global.max_memory.or(own.max_memory),
             gpu_timeout: cli.global.gpu_timeout.or(own.gpu_timeout),
             crash_file: cli.global.crash_file.or(own.crash_file),
@@ -222,6 +224,8 @@ mod tests {
     const GLOBAL: Global = Global {
         gpu: None,
         validate: false,
+        full_barriers: false,
+        small_device: false,
         max_memory: None,
         gpu_timeout: None,
         crash_file: None,

@@ -261,6 +261,8 @@ mod tests {
     const GLOBAL: Global = Global {
         gpu: None,
         validate: false,
+        full_barriers: false,
+        small_device: false,
         max_memory: None,
         gpu_timeout: None,
         crash_file: None,
