@@ -187,7 +187,7 @@ fn what_needs_more_memory_than_allowed_is_refused() {
     render("builtin:gallery?triangles=1500000", &["--max-memory", "64M"]).fails(1, "raise --max-memory");
     render("builtin:cornell-box", &["--elements", "5000000", "--max-memory", "64M"]).fails(1, "raise --max-memory");
     // What is too large for the device alone, and would take gigabytes.
-    render("builtin:furnace", &["--size=8192x8192", "--max-memory", "96M"]).fails(1, "--max-memory");
+    render("builtin:furnace", &["--size=2600x2600", "--max-memory", "96M"]).fails(1, "--max-memory");
     render("builtin:furnace", &["--max-memory", "9"]).fails(2, "at least 1M");
     assert!(folder.names().is_empty(), "nothing is written");
 }

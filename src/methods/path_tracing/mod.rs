@@ -27,7 +27,7 @@ mod estimate;
 pub use estimate::ErrorEstimate;
 
 use crate::gpu::shaders::methods::path_tracing as passes;
-use crate::gpu::shaders::types::{Batch, LightChoice, ViewInfo};
+use crate::gpu::shaders::types::{Batch, LightChoice, PathVertex, ViewInfo};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::scene::Scene;
 use crate::scene::camera::View;
@@ -117,7 +117,9 @@ impl PathTracing {
     ) -> Result<Self, PathTracingError> {
         let Options { width, height, settings, .. } = options;
         let pixels = u64::from(width) * u64::from(height);
-        let paths_in_flight = settings.paths_in_flight.max(1);
+        // No more than one buffer can hold; how many there are changes no pixel.
+        let most = context.limits().storage_buffer_bytes / size_of::<PathVertex>() as u64;
+        let paths_in_flight = settings.paths_in_flight.min(u32::try_from(most).unwrap_or(u32::MAX)).max(1);
         let needed = Sums::BYTES_PER_PIXEL * pixels + Paths::BYTES_PER_PATH * u64::from(paths_in_flight);
         let available = context.available_bytes();
         if needed > available {
