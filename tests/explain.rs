@@ -91,6 +91,26 @@ fn lights_and_backgrounds_are_told_by_name() {
     assert!(text.contains(" light "), "{text}");
 }
 
+/// Links made by two logical devices: the same file, to the byte.
+#[test]
+fn a_second_device_for_links_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |name: &str, options: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_linklight"));
+        command.current_dir(folder.path()).args(["render", "--quiet", "--validate", "-o", name]);
+        let output = command.args(format!("{SCENE} {options}").split_whitespace()).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    assert_eq!(render("one.exr", ""), (Some(0), String::new()));
+    assert_eq!(render("two.exr", "--link-gpu 0 --profile two.json"), (Some(0), String::new()));
+    let read = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(read("one.exr") == read("two.exr"));
+    let profile: Value = serde_json::from_slice(&read("two.json")).unwrap();
+    assert_eq!(profile["method"]["device_elements"].as_array().unwrap().len(), 2);
+    let (code, said) = render("no.exr", "--link-gpu nonesuch");
+    assert!(code != Some(0) && said.contains("nonesuch"), "{said}");
+}
+
 #[test]
 fn what_cannot_be_explained_is_refused() {
     let folder = tempfile::tempdir().unwrap();

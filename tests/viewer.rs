@@ -243,11 +243,33 @@ fn another_method_stands_beside_the_picture_and_differences_are_shown() {
     let (left, right) = (half(0), half(160));
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let off = left.iter().zip(&right).map(|(a, b)| (a - b).abs()).sum::<f64>() / left.len() as f64;
-    assert!(mean(&left) > 30.0 && (mean(&left) / mean(&right) - 1.0).abs() < 0.2 && off < 25.0 && off > 0.1, "{off}");
+    let (ours, theirs) = (mean(&left), mean(&right));
+    assert!(ours > 30.0 && (ours / theirs - 1.0).abs() < 0.2, "{ours} beside {theirs}");
+    assert!(off > 0.1 && off < 25.0, "pixels differ by {off}");
     let shot = view.shoot(1);
     view.close();
     // What is written is the picture itself.
     assert_eq!(rgb(&shot.with_extension("png")), rgb(&headless(&shot, "")));
+}
+
+#[test]
+fn a_gpu_that_is_lost_closes_the_window_and_says_where() {
+    let Some(screen_server) = Screen::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("crash.json");
+    let lost = Command::new(env!("CARGO_BIN_EXE_linklight"))
+        .args(["view", "--validate", "--lose-device-at", "display/vertex", "--crash-file"])
+        .arg(&file)
+        .args(TINY.split_whitespace())
+        .env("DISPLAY", &screen_server.name)
+        .env_remove("WAYLAND_DISPLAY")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&lost.stderr);
+    assert_eq!(lost.status.code(), Some(1), "{said}");
+    assert!(said.contains("the device was lost in") && said.contains("display/vertex"), "{said}");
+    let crash = std::fs::read_to_string(&file).unwrap();
+    assert!(crash.contains("linklight render builtin:cornell-box --method=explicit-visibility"), "{crash}");
 }
 
 #[test]

@@ -224,6 +224,10 @@ pub struct RenderArgs {
     /// Write a RenderDoc capture of the last frame
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+    /// A further GPU that makes links, by part of its name or index (explicit-visibility); the picture stays the same, bit
+    /// for bit, on GPUs of one driver; may be repeated
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub link_gpu: Vec<String>,
     /// Tell which elements, links and bounces make up this pixel, counted from the top left corner
     #[arg(long, value_name = "X,Y", value_parser = parse_pixel)]
     pub explain: Option<UVec2>,

@@ -14,9 +14,9 @@ use crate::display::g_buffer::GBuffer;
 use crate::display::shadow_maps::ShadowMaps;
 use crate::display::splat::{self, SplatLight, SplatSums};
 use crate::display::vertex::{self, VertexLight};
-use crate::gpu::Context;
+use crate::gpu::{self, Context};
 use crate::methods::antiradiance::Antiradiance;
-use crate::methods::explicit_visibility::{self, ExplicitVisibility};
+use crate::methods::explicit_visibility::{self, ExplicitVisibility, Helper};
 use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
 use crate::methods::path_tracing::{Options, PathTracing};
@@ -110,8 +110,14 @@ impl Method {
         match request.method.key {
             "path-tracing" => Ok(Self::PathTracing(Box::new(path_tracing(context, request, stage)?))),
             "explicit-visibility" => {
-                let settings = request.settings()?;
-                let method = ExplicitVisibility::prepare(context, &explicit_stage(stage, watch), settings);
+                let (settings, own) = (request.settings()?, explicit_stage(stage, watch));
+                let helper = |gpu: &String| {
+                    let (gpu, validation) = (Some(gpu.clone()), context.validates());
+                    let options = gpu::Options { gpu, validation, ..gpu::Options::default() };
+                    Helper::new(options, &own, &stage.pose, settings).map_err(AppError::failed)
+                };
+                let helpers: Vec<Helper> = request.link_gpus.iter().map(helper).collect::<Result<_, _>>()?;
+                let method = ExplicitVisibility::prepare_over(context, &own, settings, &helpers);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
                 Self::on_elements(context, request, stage, Box::new(method))

@@ -122,7 +122,7 @@ impl OnElements for ExplicitVisibility {
     }
 
     fn follow(&mut self, context: &Context, stage: &Stage<'_>, has_moved: bool) -> Result<(), AppError> {
-        let rays = self.settings().link_rays_per_frame;
+        let rays = self.settings().link_budget;
         let followed = match (rays, has_moved) {
             (0, false) => Ok(()),
             (0, true) => Self::follow(self, context, stage),

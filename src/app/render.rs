@@ -85,6 +85,8 @@ pub struct RenderRequest {
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
     pub hashes: Option<PathBuf>,
+    /// Further GPUs that make links.
+    pub link_gpus: Vec<String>,
     /// A pixel to explain, and where to write all of it.
     pub explain: Option<(UVec2, Option<PathBuf>)>,
     /// Settings are picked for this error first.
@@ -168,6 +170,10 @@ impl TryFrom<RenderArgs> for RenderRequest {
         request.profile = args.profile;
         request.trace = args.trace;
         request.capture = args.capture;
+        if !args.link_gpu.is_empty() && key != "explicit-visibility" {
+            return usage(format!("--link-gpu needs --method explicit-visibility; {key} makes no links by rays"));
+        }
+        request.link_gpus = args.link_gpu;
         request.hashes = args.hashes;
         request.explain = args.explain.map(|pixel| (pixel, args.explain_json));
         request.target = args.target_error.map(|error| Target { error, any_method });
@@ -255,6 +261,7 @@ impl RenderRequest {
             trace: None,
             capture: None,
             hashes: None,
+            link_gpus: Vec::new(),
             explain: None,
             target: None,
         })

@@ -252,7 +252,7 @@ impl Viewer {
             let window = egui::Window::new("Profile").default_width(560.0).default_pos([PANEL_WIDTH + 20.0, 20.0]);
             window.show(ui.ctx(), |ui| self.profiler.show(ui, &self.memory));
         }
-        if self.comparison.against.is_some() {
+        if self.comparison.against.is_some() && !self.is_bare {
             self.show_comparison(ui);
         }
         self.show_explanation(ui);
@@ -397,6 +397,7 @@ impl Viewer {
     fn show_comparison(&self, ui: &Ui) {
         let corner = [self.corner[0] as f32 + 10.0, self.corner[1] as f32 + 10.0];
         egui::Window::new("Comparison").default_pos(corner).resizable(false).show(ui.ctx(), |ui| {
+            ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
             match &self.compared {
                 Some(compared) => compared.rows(ui),
                 None => drop(ui.label("waiting for the other picture")),

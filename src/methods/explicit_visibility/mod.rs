@@ -79,7 +79,7 @@ crate::settings! {
         packed_links: bool = false, paper "off";
         /// While surfaces move: rays for new links in a frame, which is lit along the old ones until all are new; 0 makes
         /// all of them in every frame.
-        link_rays_per_frame: u32 = 0, range 0..=4_000_000_000, unit "rays", paper "asynchronous, on a second device";
+        link_budget: u32 = 0, range 0..=4_000_000_000, unit "rays", paper "asynchronous, on a second device";
         /// What the picture shows.
         show: Shown = Shown::Light, paper "light";
         /// How far rays start off their surface, as a share of the scene's extent.

@@ -52,6 +52,9 @@ impl fmt::Display for Report {
             self.compression,
             self.link_bytes as f64 / (1 << 20) as f64
         )?;
+        if !self.device_elements.is_empty() {
+            write!(f, "; made by devices in runs of {:?} elements", self.device_elements)?;
+        }
         match self.unresolved_elements {
             0 => Ok(()),
             count => write!(f, "; {count} elements inside other things take their neighbours' light"),
