@@ -77,7 +77,6 @@ pub struct Context {
     pub(super) options: Options,
     pub(super) pipelines: Pipelines,
     pub(super) markers: Markers,
-    pub(super) queue_lock: Mutex<()>,
     pub(super) staging_pool: Mutex<StagingPool>,
     slots: Mutex<Vec<CommandSlot>>,
     records: Mutex<Vec<PassRecord>>,
@@ -106,7 +105,6 @@ impl Context {
             options,
             pipelines,
             markers,
-            queue_lock: Mutex::default(),
             staging_pool: Mutex::default(),
             slots: Mutex::default(),
             records: Mutex::default(),
@@ -259,7 +257,7 @@ impl Context {
                 // The work may still be running: until it ends, nothing that it uses may be freed or used again.
                 // SAFETY: the device is alive; the queue is ours alone while its lock is held.
                 let idle = {
-                    let _queue = lock(&self.queue_lock);
+                    let _queue = lock(&self.device.queue_lock);
                     unsafe { self.device.raw.device_wait_idle() }
                 };
                 match idle {

@@ -40,6 +40,8 @@ static DEVICES: AtomicU64 = AtomicU64::new(0);
 pub(super) struct Device {
     pub raw: ash::Device,
     pub queue: vk::Queue,
+    /// Held by whoever submits, presents, or waits for the queue.
+    pub queue_lock: Mutex<()>,
     pub queue_family: u32,
     pub limits: Limits,
     pub info: DeviceInfo,
@@ -184,6 +186,7 @@ impl Device {
             let has = |name| extensions.contains(&name);
             let device = Self {
                 queue,
+                queue_lock: Mutex::default(),
                 queue_family,
                 limits,
                 info,

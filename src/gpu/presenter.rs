@@ -93,7 +93,7 @@ impl Presenter {
         let info =
             vk::PresentInfoKHR::default().wait_semaphores(&semaphores).swapchains(&swapchains).image_indices(&indices);
         let presented = {
-            let _queue = lock(&context.queue_lock);
+            let _queue = lock(&context.device.queue_lock);
             // SAFETY: the image was acquired and is in PRESENT_SRC; queue access is exclusive by the lock.
             unsafe { self.loader.queue_present(self.device.queue, &info) }
         };
@@ -279,7 +279,7 @@ impl Presenter {
     }
 
     fn drop_swapchain(&mut self, context: &Context) {
-        let _queue = lock(&context.queue_lock);
+        let _queue = lock(&context.device.queue_lock);
         self.destroy_swapchain();
     }
 
@@ -300,11 +300,13 @@ impl Presenter {
 }
 
 impl Drop for Presenter {
-    /// The last use of the queue: whoever else submitted has ended.
+    /// Others may still submit.
     fn drop(&mut self) {
         if self.device.is_hung.load(Ordering::Acquire) {
             return;
         }
+        let device = self.device.clone();
+        let _queue = lock(&device.queue_lock);
         self.destroy_swapchain();
         // SAFETY: the queue is idle and the swapchain gone.
         unsafe {

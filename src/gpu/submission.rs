@@ -61,7 +61,7 @@ impl Recorder<'_> {
             device.end_label(commands);
             device.raw.end_command_buffer(commands).checked("vkEndCommandBuffer", &last_pass)?;
             let value = {
-                let _queue = lock(&self.context.queue_lock);
+                let _queue = lock(&device.queue_lock);
                 let value = device.submitted.load(Ordering::Acquire) + 1;
                 // Values of binary semaphores are ignored.
                 let (wait_values, values) = ([0], [value, 0]);
