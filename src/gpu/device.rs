@@ -196,6 +196,7 @@ impl Device {
                     .ray_query
                     .then(|| khr::acceleration_structure::Device::new(&instance.raw, &raw)),
                 calibrated_timestamps: match () {
+                    () if !optional.calibrated_timestamps => None,
                     () if has(khr::calibrated_timestamps::NAME) => {
                         Some(CalibratedTimestamps::Khr(khr::calibrated_timestamps::Device::new(&instance.raw, &raw)))
                     }
@@ -205,7 +206,7 @@ impl Device {
                     () => None,
                 },
                 device_fault: optional.device_fault.then(|| ext::device_fault::Device::new(&instance.raw, &raw)),
-                buffer_marker: has(amd::buffer_marker::NAME)
+                buffer_marker: (optional.buffer_marker && has(amd::buffer_marker::NAME))
                     .then(|| amd::buffer_marker::Device::new(&instance.raw, &raw)),
                 dynamic_rendering: has(khr::dynamic_rendering::NAME)
                     .then(|| khr::dynamic_rendering::Device::new(&instance.raw, &raw)),

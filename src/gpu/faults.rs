@@ -264,6 +264,10 @@ all_calls! {
         device: vk::Device, pool: vk::QueryPool, first: u32, count: u32, size: usize, data: *mut c_void, stride: u64,
         flags: vk::QueryResultFlags
     );
+    vkGetCalibratedTimestampsKHR(
+        device: vk::Device, count: u32, infos: *const vk::CalibratedTimestampInfoKHR<'static>, timestamps: *mut u64,
+        deviation: *mut u64
+    );
     vkGetCalibratedTimestampsEXT(
         device: vk::Device, count: u32, infos: *const vk::CalibratedTimestampInfoKHR<'static>, timestamps: *mut u64,
         deviation: *mut u64
