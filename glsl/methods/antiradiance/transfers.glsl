@@ -41,26 +41,31 @@ float disc_solid_angle(float area)
     return 0.5 * FOUR_PI * (ratio / (sqrt(1.0 + ratio) * (sqrt(1.0 + ratio) + 1.0)));
 }
 
-// The bin that carries light along w: the nearest one on the sides of both ends that w itself is on.
-uint bin_between(End p, End q, vec3 w)
+// Whether light along v is on the sides of both ends that p_cos and q_cos say.
+bool is_between(End p, End q, vec3 v, float p_cos, float q_cos)
+{
+    return !(p.is_flat && dot(p.normal, v) * p_cos <= 0.0) && !(q.is_flat && dot(q.normal, v) * q_cos <= 0.0);
+}
+
+// The bin that carries light along w, and its direction: the nearest one on the sides of both ends that w itself is on.
+uint bin_between(End p, End q, vec3 w, out vec3 v)
 {
     float p_cos = dot(p.normal, w), q_cos = dot(q.normal, w);
     uint middle = bin_of(w, params.bins.side);
+    v = bin_directions[middle];
+    if (is_between(p, q, v, p_cos, q_cos)) return middle;
+    // Nearest of all is the bin itself.
     uint last = spread_offsets[middle + 1];
-    for (uint k = spread_offsets[middle]; k < last; ++k) {
-        uint bin = spread[k].bin;
-        vec3 v = bin_directions[bin];
-        if (p.is_flat && dot(p.normal, v) * p_cos <= 0.0) continue;
-        if (q.is_flat && dot(q.normal, v) * q_cos <= 0.0) continue;
-        return bin;
+    for (uint k = spread_offsets[middle] + 1; k < last; ++k) {
+        v = bin_directions[spread[k].bin];
+        if (is_between(p, q, v, p_cos, q_cos)) return spread[k].bin;
     }
     return NONE;
 }
 
-// What `covered` bins' worth of light along w arrives as, by way of `bin`: irradiance is that of w.
-float weight_between(End p, End q, vec3 w, uint bin, float covered)
+// What `covered` bins' worth of light along w arrives as, by way of a bin along v: irradiance is that of w.
+float weight_between(End p, End q, vec3 w, vec3 v, float covered)
 {
-    vec3 v = bin_directions[bin];
     if (p.is_flat) covered *= abs(dot(p.normal, w)) / discrete_cosine(dot(p.normal, v), p.norm, params.bins.count);
     return q.is_flat ? covered / discrete_cosine(dot(q.normal, v), q.norm, params.bins.count) : covered;
 }
@@ -78,7 +83,8 @@ void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, E
         if (!(squared > 0.0)) continue;
         vec3 w = offset / sqrt(squared);
         if (passes_behind && dot(p.normal, w) >= 0.0) continue;
-        uint bin = bin_between(p, q, w);
+        vec3 v;
+        uint bin = bin_between(p, q, w, v);
         if (bin == NONE) continue;
         float solid_angle = disc_solid_angle(from.area / float(side * side) * abs(dot(q.normal, w)) / squared);
         float covered = solid_angle * float(params.bins.count) / FOUR_PI;
@@ -88,7 +94,7 @@ void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, E
             bins[found] = bin;
             weights[found++] = vec2(0.0);
         }
-        weights[k] += vec2(weight_between(p, q, w, bin, covered), covered);
+        weights[k] += vec2(weight_between(p, q, w, v, covered), covered);
     }
     // No bin is covered more than once: what is let through is then never more than what came.
     for (uint k = 0; k < found; ++k) transfer(receiver, bins[k], sender, bins[k], weights[k].x / max(weights[k].y, 1.0));
@@ -121,9 +127,10 @@ void transfers_of(uint sender, uint receiver)
     uint size_class = doublings < 0.25 ? 0u : min(uint(ceil(2.0 * doublings)), params.bins.class_count);
     uint middle = bin_of(w, params.bins.side);
     if (size_class == 0) {
-        uint bin = bin_between(p, q, w);
+        vec3 v;
+        uint bin = bin_between(p, q, w, v);
         if (bin == NONE || (passes_behind && dot(p.normal, w) >= 0.0)) return;
-        transfer(receiver, bin, sender, bin, weight_between(p, q, w, bin, coverage));
+        transfer(receiver, bin, sender, bin, weight_between(p, q, w, v, coverage));
         return;
     }
 
