@@ -28,7 +28,8 @@
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
 //! and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat one by
 //! samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance may not fall
-//! far below zero (selectable); the symmetric scheme is damped where it grows; near senders are discs, never more than
+//! far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes are nodes of their
+//! own; near senders are discs, never more than
 //! half of the sphere; links are made on the device. The patches of flat parts are the cells of their vertices. Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
