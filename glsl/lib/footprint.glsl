@@ -1,10 +1,7 @@
 #ifndef LIB_FOOTPRINT
 #define LIB_FOOTPRINT
-// Which bins of a receiver a sender may fill.                                                      [Dong2007 4.2.2]
-//
-// Bridge: the kernel looks which of a rectangle of cells of a face it fills; both ends belong to the ranges.
+// Which bins of a receiver a sender may fill: those whose centres a sphere around it covers, face by face.  [Dong2007 4.2.2]
 #include "lib/bins.glsl"
-void look_at(uint face, ivec2 columns, ivec2 rows);
 
 // Range of x / z over a sphere around (x, z) seen from the origin, clamped to -1..1; empty where it lies behind.
 vec2 slope_range(float x, float z, float radius)
@@ -35,19 +32,41 @@ uint faces_around(vec3 offset, float reach, uint main_face)
            | (range_v.y >= 1.0 ? 1u << beside_v : 0u) | (range_v.x <= -1.0 ? 2u << beside_v : 0u);
 }
 
-// Looks at the bins whose centres a sphere of radius `reach` at `offset` may cover.
-void look_around(vec3 offset, float reach, uint n)
+// A walk over these cells. Where threads run in lockstep, each has its own cell and face in every turn.
+struct CellWalk {
+    vec3 offset;        // of the sphere's centre, in the axes of the bins
+    float reach;        // its radius, m
+    uint faces;         // still to come, bits
+    uint face;
+    int left;           // column that rows start at
+    ivec2 cell;         // column and row
+    ivec2 last;
+};
+
+CellWalk walk_cells(vec3 offset, float reach)
 {
-    bool is_inside = dot(offset, offset) <= reach * reach;
-    uint faces = faces_around(offset, reach, face_of(offset));
-    while (faces != 0) {
-        uint face = uint(findLSB(faces));
-        faces &= faces - 1;
-        vec3 at = in_face(face, offset);
-        vec2 range_u = is_inside ? vec2(-1.0, 1.0) : slope_range(at.x, at.z, reach);
-        vec2 range_v = is_inside ? vec2(-1.0, 1.0) : slope_range(at.y, at.z, reach);
-        ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
-        if (columns.x <= columns.y && rows.x <= rows.y) look_at(face, columns, rows);
+    return CellWalk(offset, reach, faces_around(offset, reach, face_of(offset)), 0, 0, ivec2(0, 0), ivec2(-1, -1));
+}
+
+// Goes on to the next cell; false where there is none.
+bool next_cell(inout CellWalk w, uint n)
+{
+    w.cell = w.cell.x < w.last.x ? ivec2(w.cell.x + 1, w.cell.y) : ivec2(w.left, w.cell.y + 1);
+    if (w.cell.y > w.last.y) {
+        bool is_inside = dot(w.offset, w.offset) <= w.reach * w.reach;
+        w.last.y = -1;
+        while (w.last.y < w.cell.y && w.faces != 0) {
+            w.face = uint(findLSB(w.faces));
+            w.faces &= w.faces - 1;
+            vec3 at = in_face(w.face, w.offset);
+            vec2 range_u = is_inside ? vec2(-1.0, 1.0) : slope_range(at.x, at.z, w.reach);
+            vec2 range_v = is_inside ? vec2(-1.0, 1.0) : slope_range(at.y, at.z, w.reach);
+            ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
+            w.left = columns.x;
+            w.cell = ivec2(columns.x, rows.x);
+            w.last = ivec2(columns.y, columns.x <= columns.y ? rows.y : -1);
+        }
     }
+    return w.cell.y <= w.last.y;
 }
 #endif

@@ -47,9 +47,13 @@ void main()
         vec3 across = cross(b - a, c - a);
         float sixth = 0.5 * length(across) / 6.0;
         vec3 p = v.x == vertex ? b : v.y == vertex ? c : a, q = v.x == vertex ? c : v.y == vertex ? a : b;
-        if (!is_back) cell_corners[k] = CellCorner(p, q);
         p -= origin;
         q -= origin;
+        if (!is_back) {
+            vec3 normal = cross(p, q);
+            float inverse = dot(normal, normal) > 0.0 ? 1.0 / dot(normal, normal) : 0.0;
+            cell_corners[k] = CellCorner(normal, inverse * cross(q, normal), inverse * cross(normal, p));
+        }
         vec3 centre = (p + q) / 3.0;
         for (uint half_index = 0; half_index < 2; ++half_index) {
             vec3 middle = 0.5 * (half_index == 0 ? p : q), sum = middle + centre;

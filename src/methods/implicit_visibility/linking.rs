@@ -271,22 +271,10 @@ impl Linking {
             receivers: &self.receivers,
             keys: &self.keys,
             winners: &window.winners,
-            params: passes::ResolveParams { n: settings.bins, is_turned: u32::from(settings.is_turned()) },
+            constants: passes::ResolveConstants { is_turned: u32::from(settings.is_turned()) },
+            params: passes::ResolveParams { n: settings.bins, fills_holes: u32::from(settings.fill_holes) },
         };
-        let rows = window.plan.leaves().len() * 6 * settings.bins as usize;
-        recorder.dispatch(&pass, rows);
-        if settings.fill_holes {
-            let pass = passes::FillHoles {
-                node_segments: &trees.node_segments,
-                segments: &trees.segments,
-                window_levels: &window.levels,
-                receivers: &self.receivers,
-                keys: &self.keys,
-                winners: &window.winners,
-                params: passes::FillHolesParams { n: settings.bins, is_turned: u32::from(settings.is_turned()) },
-            };
-            recorder.dispatch(&pass, rows);
-        }
+        recorder.dispatch(&pass, window.plan.leaves().len() * 6 * settings.bins as usize);
     }
 
     /// The winners of one leaf's bins, for views and tests.
