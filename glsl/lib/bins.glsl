@@ -37,11 +37,14 @@ struct ReceiverGroup {
 struct GroupWalk {
     uint step;
     uint left_from_above;   // step from which on the group above did not look
-    uvec3 held;
+    uvec4 held;
 };
 const uint OF_LEAVES = 0;       // senders that are leaves, seen by their triangles
-const uint OF_PLANES = 1;       // nodes about a plane, seen by their ellipses
-const uint OF_OUTLINES = 2;     // nodes without one, seen by their outlines
+const uint OF_FLAT_LEAVES = 1;  // whose triangles lie in one plane
+const uint OF_PLANES = 2;       // nodes about a plane, seen by their ellipses
+const uint OF_OUTLINES = 3;     // nodes without one, seen by their outlines
+const uint KINDS = 4;
+const float FLAT = 1e-3;        // a leaf as thin as this, against its radius, is a plane
 
 // What was counted while links were made.
 struct LinkCounts {

@@ -20,18 +20,6 @@ ivec2 cells_between(vec2 range, uint n)
     return clamp(ivec2(ceil(at.x), floor(at.y)), ivec2(0, -1), ivec2(n, int(n) - 1));
 }
 
-// The faces that a sphere may reach over to, bits: beside the face that its centre lies in, those beyond the rims that it
-// crosses.
-uint faces_around(vec3 offset, float reach, uint main_face)
-{
-    vec3 at = in_face(main_face, offset);
-    if (at.z <= reach) return 63;       // it reaches beside or behind the eye
-    vec2 range_u = slope_range(at.x, at.z, reach), range_v = slope_range(at.y, at.z, reach);
-    uint axis = main_face >> 1, beside_u = 2 * (axis == 2 ? 0 : axis + 1), beside_v = 2 * (axis == 0 ? 2 : axis - 1);
-    return 1u << main_face | (range_u.y >= 1.0 ? 1u << beside_u : 0u) | (range_u.x <= -1.0 ? 2u << beside_u : 0u)
-           | (range_v.y >= 1.0 ? 1u << beside_v : 0u) | (range_v.x <= -1.0 ? 2u << beside_v : 0u);
-}
-
 // A walk over these cells. Where threads run in lockstep, each has its own cell and face in every turn.
 struct CellWalk {
     vec3 offset;        // of the sphere's centre, in the axes of the bins
@@ -43,30 +31,50 @@ struct CellWalk {
     ivec2 last;
 };
 
-CellWalk walk_cells(vec3 offset, float reach)
+void walk_rectangle(inout CellWalk w, vec2 range_u, vec2 range_v, uint n)
 {
-    return CellWalk(offset, reach, faces_around(offset, reach, face_of(offset)), 0, 0, ivec2(0, 0), ivec2(-1, -1));
+    ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
+    w.left = columns.x;
+    w.cell = ivec2(columns.x, rows.x);
+    w.last = ivec2(columns.y, columns.x <= columns.y ? rows.y : -1);
 }
 
-// Goes on to the next cell; false where there is none.
-bool next_cell(inout CellWalk w, uint n)
+// To the next face with cells, where the present rectangle is done.
+void find_rectangle(inout CellWalk w, uint n)
+{
+    while (w.last.y < w.cell.y && w.faces != 0) {
+        w.face = uint(findLSB(w.faces));
+        w.faces &= w.faces - 1;
+        vec3 at = in_face(w.face, w.offset);
+        bool is_inside = dot(w.offset, w.offset) <= w.reach * w.reach;
+        walk_rectangle(w, is_inside ? vec2(-1.0, 1.0) : slope_range(at.x, at.z, w.reach),
+                       is_inside ? vec2(-1.0, 1.0) : slope_range(at.y, at.z, w.reach), n);
+    }
+}
+
+// Starts with the face that the centre lies in; others are those beyond the rims that the sphere crosses there.
+CellWalk walk_cells(vec3 offset, float reach, uint n)
+{
+    CellWalk w = CellWalk(offset, reach, 0, face_of(offset), 0, ivec2(0), ivec2(-1));
+    vec3 at = in_face(w.face, offset);
+    if (at.z <= reach) {
+        w.faces = 63;       // it reaches beside or behind the eye
+    } else {
+        vec2 range_u = slope_range(at.x, at.z, reach), range_v = slope_range(at.y, at.z, reach);
+        uint axis = w.face >> 1, beside_u = 2 * (axis == 2 ? 0 : axis + 1), beside_v = 2 * (axis == 0 ? 2 : axis - 1);
+        w.faces = (range_u.y >= 1.0 ? 1u << beside_u : 0u) | (range_u.x <= -1.0 ? 2u << beside_u : 0u)
+                  | (range_v.y >= 1.0 ? 1u << beside_v : 0u) | (range_v.x <= -1.0 ? 2u << beside_v : 0u);
+        walk_rectangle(w, range_u, range_v, n);
+    }
+    if (w.last.y < w.cell.y && w.faces != 0) find_rectangle(w, n);
+    return w;
+}
+
+bool has_cell(CellWalk w) { return w.cell.y <= w.last.y; }
+
+void next_cell(inout CellWalk w, uint n)
 {
     w.cell = w.cell.x < w.last.x ? ivec2(w.cell.x + 1, w.cell.y) : ivec2(w.left, w.cell.y + 1);
-    if (w.cell.y > w.last.y) {
-        bool is_inside = dot(w.offset, w.offset) <= w.reach * w.reach;
-        w.last.y = -1;
-        while (w.last.y < w.cell.y && w.faces != 0) {
-            w.face = uint(findLSB(w.faces));
-            w.faces &= w.faces - 1;
-            vec3 at = in_face(w.face, w.offset);
-            vec2 range_u = is_inside ? vec2(-1.0, 1.0) : slope_range(at.x, at.z, w.reach);
-            vec2 range_v = is_inside ? vec2(-1.0, 1.0) : slope_range(at.y, at.z, w.reach);
-            ivec2 columns = cells_between(range_u, n), rows = cells_between(range_v, n);
-            w.left = columns.x;
-            w.cell = ivec2(columns.x, rows.x);
-            w.last = ivec2(columns.y, columns.x <= columns.y ? rows.y : -1);
-        }
-    }
-    return w.cell.y <= w.last.y;
+    if (w.last.y < w.cell.y && w.faces != 0) find_rectangle(w, n);
 }
 #endif

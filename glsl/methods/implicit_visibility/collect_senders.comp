@@ -10,7 +10,7 @@
 //                                                                                                  [Dong2007 4.2.2]
 // reads receiver_groups, walk_texels[WALK_TEXELS * node_count], surfels[node_count]
 // updates group_walks[group_count], link_counts, unfinished[1] (1: a walk stopped)
-// writes held_senders[3 * capacity * group_count]   shared none
+// writes held_senders[KINDS * capacity * group_count]   shared none
 // Differs from [Dong2007]: pairs are directed, and a pair is not queued but found by its receiver's walk.
 layout(local_size_x = 16) in;
 layout(set = 0, binding = 0) uniform usamplerBuffer walk_texels;
@@ -61,23 +61,23 @@ void main()
 
     GroupWalk at = group_walks[slot];
     // Where the walk of the group above did not go further down, and left what is below to its children.
-    if (params.is_start != 0) at = GroupWalk(0, has_above ? 0 : params.walk_count, uvec3(0));
-    at.held = uvec3(0);
-    uint first = 3 * params.capacity * slot, visited = 0;
+    if (params.is_start != 0) at = GroupWalk(0, has_above ? 0 : params.walk_count, uvec4(0));
+    at.held = uvec4(0);
+    uint first = KINDS * params.capacity * slot, visited = 0;
     // Without branches but the last: where threads run in lockstep, each is taken by some.
-    while (at.step < params.walk_count && max(at.held.x, max(at.held.y, at.held.z)) < params.capacity) {
-        vec4 place = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step)));
+    while (at.step < params.walk_count && max(max(at.held.x, at.held.y), max(at.held.z, at.held.w)) < params.capacity) {
+        vec4 centre = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step)));
         vec4 facing = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step + 1)));
         uvec4 rest = texelFetch(walk_texels, int(WALK_TEXELS * at.step + 2));
         uint sender = rest.x, skip = rest.y;
-        float radius = place.w, sender_extent = facing.w, thickness = uintBitsToFloat(rest.z);
+        float radius = centre.w, sender_extent = facing.w, thickness = uintBitsToFloat(rest.z);
         bool is_leaf = sender < params.leaf_count;
         ++visited;
 
-        vec3 offset = place.xyz - own.centre;
+        vec3 offset = centre.xyz - own.centre;
         bool is_dropped = is_below_horizon(receiver, Extents(facing.xyz, 0.0, radius, thickness), offset);
 
-        vec3 from_above = place.xyz - above.centre;
+        vec3 from_above = centre.xyz - above.centre;
         float nearest_above = length(from_above) - above.radius;
         bool ends_above = !is_dropped && at.step >= at.left_from_above
                           && (is_leaf || fits(sender_extent, from_above, nearest_above));
@@ -92,10 +92,12 @@ void main()
         is_dropped = is_dropped || (!of_leaves && !may_fit);    // left to the children
 
         if (!is_dropped && !is_refined) {
-            uint kind = is_leaf ? OF_LEAVES : uintBitsToFloat(rest.w) < 0.5 ? OF_OUTLINES : OF_PLANES;
-            uint place_in_list = kind == OF_LEAVES ? at.held.x : kind == OF_PLANES ? at.held.y : at.held.z;
-            held_senders[first + kind * params.capacity + place_in_list] = sender;
-            at.held += uvec3(equal(uvec3(OF_LEAVES, OF_PLANES, OF_OUTLINES), uvec3(kind)));
+            uint of_leaf = thickness <= FLAT * radius ? OF_FLAT_LEAVES : OF_LEAVES;
+            uint of_node = uintBitsToFloat(rest.w) < 0.5 ? OF_OUTLINES : OF_PLANES;
+            uvec4 is_kind = uvec4(equal(uvec4(0, 1, 2, 3), uvec4(is_leaf ? of_leaf : of_node)));
+            uvec4 place = is_kind * (at.held + uvec4(0, 1, 2, 3) * params.capacity);
+            held_senders[first + place.x + place.y + place.z + place.w] = sender;
+            at.held += is_kind;
         }
         at.step = is_refined && !is_dropped ? at.step + 1 : skip;
     }

@@ -1,18 +1,19 @@
 #version 460
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#extension GL_EXT_shader_atomic_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/footprint.glsl"
 #include "lib/surfel.glsl"
 #include "methods/implicit_visibility/horizon.glsl"
 
-// One workgroup per group of receiving nodes of a window, a thread for each: proposes the senders of one kind that the
-// group holds to its own bins, which keep the nearest.                                             [Dong2007 4.2.2]
+// One workgroup per group of receiving nodes of a window, a thread for each sender of one kind that the group holds, one
+// after the other: proposes it to the bins of all nodes of the group, which keep the nearest.      [Dong2007 4.2.2]
 // reads receiver_groups, group_walks, held_senders, surfels, moments [node_count], receivers, leaf_cells [leaf_count],
-// cell_corners   updates keys[rows * 6 n n] (distance bits above, back and node below; each row by its own thread),
-// link_counts   shared none
+// cell_corners   updates keys[rows * 6 n n] (distance bits above, back and node below), link_counts   shared none
+// A thread keeps its sender, which is much, and loads receivers, which are little: loads are what costs most.
 // Differs from [Dong2007]: a sender fills all the bins whose centres see it, at its distance in each, and blocks where it
 // turns its back.
-layout(local_size_x = 16) in;
+layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Groups { ReceiverGroup receiver_groups[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Surfels { Surfel surfels[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Moments { SurfelMoments moments[]; };
@@ -30,47 +31,51 @@ layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint capacity;          // senders of each kind that a group may hold
 } params;
-// Of senders: OF_LEAVES, OF_PLANES, OF_OUTLINES.
+// Of senders: OF_LEAVES to OF_OUTLINES.
 layout(constant_id = 0) const uint KIND = 0;
 // 1: one bin a sender, as in the paper.
 layout(constant_id = 1) const uint IS_SINGLE = 0;
 // 1: leaves' bins are not along the world's axes.
 layout(constant_id = 2) const uint IS_TURNED = 0;
 
-const float FLAT = 1e-3;    // a cell as thin as this, against its radius, is a plane
-
 #include "methods/implicit_visibility/propose.glsl"
 
 void main()
 {
-    // What a workgroup has in common is told by its own index: then its loads are common too.
-    uint slot = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x, lane = gl_LocalInvocationID.x;
+    uint slot = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
     if (slot >= params.group_count) return;
     ReceiverGroup group = receiver_groups[params.first_group + slot];
-    uint first = (3 * slot + KIND) * params.capacity, count = group_walks[slot].held[KIND];
-    if (lane >= group.count || count == 0) return;
-
-    uint receiver = group.first + lane;
-    row_first_key = (group.row + lane) * 6 * params.n * params.n;
-    Surfel a = surfels[receiver];
-    Extents own = Extents(a.normal, a.cos_cone, a.radius, a.thickness);
-    at = Receiver(a.centre, a.normal, vec4(0.0, 0.0, 0.0, 1.0));
-    if (group.first < params.leaf_count) {
-        // It receives at one point with one normal.
-        at = receivers[receiver];
-        own = Extents(at.normal, 1.0, 0.0, 0.0);
-    }
-
+    bool of_leaves = group.first < params.leaf_count;
+    uint first = (KINDS * slot + KIND) * params.capacity, count = group_walks[slot].held[KIND];
     uint proposed = 0;
-    for (uint k = first; k < first + count; ++k) {
-        sender = held_senders[k];
+    for (uint k = gl_LocalInvocationID.x; k < count; k += 64) {
+        sender = held_senders[first + k];
         b = surfels[sender];
-        offset = b.centre - at.origin;
-        bool is_itself = receiver == sender && b.thickness <= FLAT * b.radius;
-        if (!is_itself && !is_below_horizon(own, Extents(b.normal, 0.0, b.radius, b.thickness), offset)) {
-            ++proposed;
-            link();
-        }
+        Extents extents = Extents(b.normal, 0.0, b.radius, b.thickness);
+        if (are_leaves()) cell = leaf_cells[sender];
+        // Of leaves with many triangles around them, some after the other.
+        uint from = 0;
+        do {
+            if (are_leaves()) hold_corners(from);
+            for (uint receiver = group.first; receiver < group.first + group.count; ++receiver) {
+                Extents own;
+                if (of_leaves) {
+                    // It receives at one point with one normal.
+                    at = receivers[receiver];
+                    own = Extents(at.normal, 1.0, 0.0, 0.0);
+                } else {
+                    at = Receiver(surfels[receiver].centre, surfels[receiver].normal, vec4(0.0, 0.0, 0.0, 1.0));
+                    own = Extents(at.normal, surfels[receiver].cos_cone, surfels[receiver].radius, surfels[receiver].thickness);
+                }
+                offset = b.centre - at.origin;
+                bool is_itself = KIND == OF_FLAT_LEAVES && receiver == sender;
+                if (!is_itself && !is_below_horizon(own, extents, offset)) {
+                    proposed += from == 0 ? 1 : 0;
+                    link((group.row + receiver - group.first) * 6 * params.n * params.n);
+                }
+            }
+            from += HELD_CORNERS;
+        } while (are_leaves() && from < cell.corner_count);
     }
     atomicAdd(link_counts[0].proposed, proposed);
 }

@@ -2,17 +2,36 @@
 #define PROPOSE
 // A sender's proposals to a receiver's bins.                                                       [Dong2007 4.2.2]
 //
-// The kernel binds moments, leaf_cells, cell_corners, keys, has params n, constants KIND, IS_SINGLE, IS_TURNED, and sets:
-uint row_first_key;
-Receiver at;
-Surfel b;               // the sender, as seen: a cluster without a plane has its outline's normal and axes
+// The kernel binds moments, cell_corners, keys, has params n, constants KIND, IS_SINGLE, IS_TURNED, and sets:
 uint sender;
+Surfel b;
+LeafCell cell;          // of a leaf
+Receiver at;
 vec3 offset;            // from receiver to sender
 
-void propose(uint bin, float distance_there, bool is_back)
+bool are_leaves()
+{
+    if (KIND == OF_LEAVES) return true;
+    return KIND == OF_FLAT_LEAVES;
+}
+
+void propose(uint place, float distance_there, bool is_back)
 {
     uint64_t key = packUint2x32(uvec2(sender | (is_back ? BACK_SEEN : 0u), floatBitsToUint(distance_there)));
-    if (key < keys[row_first_key + bin]) keys[row_first_key + bin] = key;
+    // What another thread writes meanwhile is nearer, not farther.
+    if (key < keys[place]) atomicMin(keys[place], key);
+}
+
+// Some of the triangles around a leaf.
+const uint HELD_CORNERS = 8;
+CellCorner corners[HELD_CORNERS];
+
+void hold_corners(uint from)
+{
+    [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
+        corners[k] = CellCorner(vec3(0.0), vec3(0.0), vec3(0.0));       // which no direction meets
+        if (from + k < cell.corner_count) corners[k] = cell_corners[cell.first_corner + from + k];
+    }
 }
 
 // Where a direction meets the sender, in lengths of the direction; FAR where it does not.
@@ -23,65 +42,92 @@ struct Meeting {
 const float FAR = 1e30;
 
 // The cell of a leaf is where its vertex has the largest barycentric coordinate of the triangles around it.
-Meeting meet_leaf(LeafCell cell, vec3 direction)
+bool is_in_cell(CellCorner corner, vec3 from_vertex)
+{
+    float p = dot(corner.along_p, from_vertex), q = dot(corner.along_q, from_vertex);
+    return min(p, q) >= 0.0 && 1.0 - p - q >= max(p, q);
+}
+
+// A corner that the leaf does not have, in an unrolled loop.
+#define IS_NO_CORNER(k) (k >= 4 && k >= cell.corner_count)
+
+Meeting meet_leaf(vec3 direction)
 {
     Meeting nearest = Meeting(FAR, false);
     vec3 to_vertex = cell.vertex - at.origin;
-    for (uint k = cell.first_corner; k < cell.first_corner + cell.corner_count; ++k) {
-        CellCorner corner = cell_corners[k];
-        float plane = dot(corner.across, to_vertex), t = plane / dot(corner.across, direction);
-        vec3 there = t * direction - to_vertex;
-        float p = dot(corner.along_p, there), q = dot(corner.along_q, there);
+    [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
+        if (IS_NO_CORNER(k)) continue;
+        float plane = dot(corners[k].across, to_vertex), t = plane / dot(corners[k].across, direction);
         bool is_back = plane > 0.0 == ((cell.sides & CELL_OF_BACK) == 0);
         // Of a two-sided surface another leaf shows the back.
-        bool is_own = t > 0.0 && min(p, q) >= 0.0 && 1.0 - p - q >= max(p, q)
-                      && !(is_back && (cell.sides & CELL_HAS_OTHER_SIDE) != 0);
-        if (is_own && t < nearest.t) nearest = Meeting(t, is_back);
+        bool is_shown = !is_back || (cell.sides & CELL_HAS_OTHER_SIDE) == 0;
+        bool is_nearer = t > 0.0 && t < nearest.t && is_shown && is_in_cell(corners[k], t * direction - to_vertex);
+        nearest.t = is_nearer ? t : nearest.t;
+        nearest.is_back = is_nearer ? is_back : nearest.is_back;
     }
     return nearest;
 }
 
-// The ellipse of a node; `r` and `s` are plane * g - dot(g, offset) * normal of its two axes.
-Meeting meet_ellipse(float plane, vec3 r, vec3 s, vec3 direction)
+Meeting meet_flat_leaf(float plane, vec3 direction)
 {
-    float slope = dot(b.normal, direction), x = dot(r, direction), y = dot(s, direction);
+    float t = plane / dot(b.normal, direction);
+    vec3 from_vertex = t * direction - (cell.vertex - at.origin);
+    bool is_in = false;
+    [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
+        if (!IS_NO_CORNER(k)) is_in = is_in || is_in_cell(corners[k], from_vertex);
+    }
+    return Meeting(is_in && t > 0.0 ? t : FAR, plane > 0.0);
+}
+
+// The ellipse of a node about `normal`; `r` and `s` are plane * g - dot(g, offset) * normal of its two axes.
+Meeting meet_ellipse(vec3 normal, float plane, vec3 r, vec3 s, vec3 direction)
+{
+    float slope = dot(normal, direction), x = dot(r, direction), y = dot(s, direction);
     bool is_met = slope * plane > 0.0 && x * x + y * y <= slope * slope;
     return Meeting(is_met ? plane / slope : FAR, plane > 0.0);
 }
 
-void link()
+// `row`: place of the receiver's first bin.
+void link(uint row)
 {
     vec3 local_offset = IS_TURNED != 0 ? turn_back(at.frame, offset) : offset;
     if (IS_SINGLE != 0) {
-        propose(bin_of(local_offset, params.n), length(offset), dot(b.normal, offset) > 0.0);
+        propose(row + bin_of(local_offset, params.n), length(offset), dot(b.normal, offset) > 0.0);
         return;
     }
+    Surfel seen = b;
     float reach = b.radius, plane = 0.0;
     vec3 r = vec3(0.0), s = vec3(0.0);
-    LeafCell cell = leaf_cells[KIND == OF_LEAVES ? sender : 0];
-    if (KIND != OF_LEAVES) {
-        if (KIND == OF_OUTLINES) {
-            b.normal = normalize(offset);
-            shape_surfel(moments[sender], b);
-            b.g1 *= SURFEL_REACH / SURFEL_OUTLINE;
-            b.g2 *= SURFEL_REACH / SURFEL_OUTLINE;
-        }
-        plane = dot(b.normal, offset);
-        r = plane * b.g1 - dot(b.g1, offset) * b.normal;
-        s = plane * b.g2 - dot(b.g2, offset) * b.normal;
-        // The longer semi-axis, from the smaller singular value of (g1, g2).
-        float g11 = dot(b.g1, b.g1), g12 = dot(b.g1, b.g2), g22 = dot(b.g2, b.g2);
-        float least = 0.5 * (g11 + g22) - sqrt(0.25 * (g11 - g22) * (g11 - g22) + g12 * g12);
-        reach = least > 0.0 ? min(1.0 / sqrt(least), 4.0 * b.extent) : 4.0 * b.extent;
+    if (KIND == OF_FLAT_LEAVES) {
+        plane = dot(b.normal, cell.vertex - at.origin);
+        if (plane > 0.0 && (cell.sides & CELL_HAS_OTHER_SIDE) != 0) return;     // another leaf shows the back
     }
-    CellWalk walk = walk_cells(local_offset, reach);
-    while (next_cell(walk, params.n)) {
+    if (!are_leaves()) {
+        if (KIND == OF_OUTLINES) {
+            // A cluster without a plane: its outline as seen from here.
+            seen.normal = normalize(offset);
+            shape_surfel(moments[sender], seen);
+            seen.g1 *= SURFEL_REACH / SURFEL_OUTLINE;
+            seen.g2 *= SURFEL_REACH / SURFEL_OUTLINE;
+        }
+        plane = dot(seen.normal, offset);
+        r = plane * seen.g1 - dot(seen.g1, offset) * seen.normal;
+        s = plane * seen.g2 - dot(seen.g2, offset) * seen.normal;
+        // The longer semi-axis, from the smaller singular value of (g1, g2).
+        float g11 = dot(seen.g1, seen.g1), g12 = dot(seen.g1, seen.g2), g22 = dot(seen.g2, seen.g2);
+        float least = 0.5 * (g11 + g22) - sqrt(0.25 * (g11 - g22) * (g11 - g22) + g12 * g12);
+        reach = least > 0.0 ? min(1.0 / sqrt(least), 4.0 * seen.extent) : 4.0 * seen.extent;
+    }
+    for (CellWalk walk = walk_cells(local_offset, reach, params.n); has_cell(walk); next_cell(walk, params.n)) {
         vec2 uv = vec2(2 * walk.cell + 1) / float(params.n) - 1.0;
         vec3 direction = face_direction(walk.face, uv);
         if (IS_TURNED != 0) direction = turn(at.frame, direction);
-        Meeting met = KIND == OF_LEAVES ? meet_leaf(cell, direction) : meet_ellipse(plane, r, s, direction);
+        Meeting met;
+        if (KIND == OF_LEAVES) met = meet_leaf(direction);
+        else if (KIND == OF_FLAT_LEAVES) met = meet_flat_leaf(plane, direction);
+        else met = meet_ellipse(seen.normal, plane, r, s, direction);
         uint bin = (walk.face * params.n + uint(walk.cell.y)) * params.n + uint(walk.cell.x);
-        if (met.t < FAR) propose(bin, met.t * sqrt(1.0 + dot(uv, uv)), met.is_back);
+        if (met.t < FAR) propose(row + bin, met.t * sqrt(1.0 + dot(uv, uv)), met.is_back);
     }
 }
 #endif

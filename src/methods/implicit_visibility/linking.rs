@@ -13,12 +13,12 @@ use std::ops::Range;
 
 /// Groups of receivers whose links are made together, and submitted at once: between them the user may interrupt.
 const GROUPS_AT_ONCE: u32 = 1 << 11;
-/// Receivers of a group, at most, and threads of its workgroup.
-const GROUP: u32 = 16;
+/// Threads of a group's workgroup.
+const LINKERS: u32 = 64;
 /// Senders of each kind that a group holds before they are linked.
 const CAPACITY: u32 = 1 << 10;
-/// Kinds of senders, in the order of `lib/bins.glsl`: leaves, nodes about a plane, nodes without one.
-const KINDS: u32 = 3;
+/// Kinds of senders, in the order of `lib/bins.glsl`: leaves, flat ones, nodes about a plane, nodes without one.
+const KINDS: u32 = 4;
 /// Threads per node that push links down.
 const PUSHERS: usize = 16;
 
@@ -248,7 +248,7 @@ impl Linking {
                     capacity: CAPACITY,
                 },
             };
-            recorder.dispatch(&pass, GROUP * group_count);
+            recorder.dispatch(&pass, LINKERS * group_count);
         }
     }
 
