@@ -51,7 +51,7 @@ const uint CELL_HAS_OTHER_SIDE = 2;     // another leaf looks the other way
 struct CellCorner {
     vec3 across;        // normal to the triangle, of twice its area
     vec3 along_p;       // 1/m
-    vec3 along_q;       // 1/m; both zero without area
+    vec3 along_q;       // 1/m; without area both are beyond all bounds
 };
 
 // A step of the walk over all nodes from the roots down: where it goes on where a node's children are not looked at.

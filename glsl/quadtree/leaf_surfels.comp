@@ -51,8 +51,9 @@ void main()
         q -= origin;
         if (!is_back) {
             vec3 normal = cross(p, q);
-            float inverse = dot(normal, normal) > 0.0 ? 1.0 / dot(normal, normal) : 0.0;
-            cell_corners[k] = CellCorner(normal, inverse * cross(q, normal), inverse * cross(normal, p));
+            cell_corners[k] = CellCorner(normal, vec3(1e20), vec3(1e20));       // without area: no place is in it
+            float squared = dot(normal, normal);
+            if (squared > 0.0) cell_corners[k] = CellCorner(normal, cross(q, normal) / squared, cross(normal, p) / squared);
         }
         vec3 centre = (p + q) / 3.0;
         for (uint half_index = 0; half_index < 2; ++half_index) {

@@ -25,12 +25,13 @@ void propose(uint place, float distance_there, bool is_back)
 // Some of the triangles around a leaf.
 const uint HELD_CORNERS = 8;
 CellCorner corners[HELD_CORNERS];
+uint held_count;
 
 void hold_corners(uint from)
 {
+    held_count = min(cell.corner_count - from, HELD_CORNERS);
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        corners[k] = CellCorner(vec3(0.0), vec3(0.0), vec3(0.0));       // which no direction meets
-        if (from + k < cell.corner_count) corners[k] = cell_corners[cell.first_corner + from + k];
+        if (k < held_count) corners[k] = cell_corners[cell.first_corner + from + k];
     }
 }
 
@@ -48,15 +49,12 @@ bool is_in_cell(CellCorner corner, vec3 from_vertex)
     return min(p, q) >= 0.0 && 1.0 - p - q >= max(p, q);
 }
 
-// A corner that the leaf does not have, in an unrolled loop.
-#define IS_NO_CORNER(k) (k >= 4 && k >= cell.corner_count)
-
 Meeting meet_leaf(vec3 direction)
 {
     Meeting nearest = Meeting(FAR, false);
     vec3 to_vertex = cell.vertex - at.origin;
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        if (IS_NO_CORNER(k)) continue;
+        if (k >= held_count) continue;
         float plane = dot(corners[k].across, to_vertex), t = plane / dot(corners[k].across, direction);
         bool is_back = plane > 0.0 == ((cell.sides & CELL_OF_BACK) == 0);
         // Of a two-sided surface another leaf shows the back.
@@ -74,7 +72,7 @@ Meeting meet_flat_leaf(float plane, vec3 direction)
     vec3 from_vertex = t * direction - (cell.vertex - at.origin);
     bool is_in = false;
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        if (!IS_NO_CORNER(k)) is_in = is_in || is_in_cell(corners[k], from_vertex);
+        if (k < held_count) is_in = is_in || is_in_cell(corners[k], from_vertex);
     }
     return Meeting(is_in && t > 0.0 ? t : FAR, plane > 0.0);
 }
