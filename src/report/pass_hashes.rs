@@ -136,10 +136,10 @@ impl PassHash {
         }
         let differs = |block: &usize| self.blocks.get(*block) != other.blocks.get(*block);
         let count = self.blocks.len().max(other.blocks.len());
-        let first = (0..count).find(differs)? as u64 * self.bytes_per_block;
+        let first = ((0..count).find(differs)? as u64).saturating_mul(self.bytes_per_block);
         Some(Difference::Content {
             first,
-            end: (first + self.bytes_per_block).min(self.bytes),
+            end: first.saturating_add(self.bytes_per_block).min(self.bytes),
             blocks: (0..count).filter(differs).count(),
             of_blocks: count,
         })

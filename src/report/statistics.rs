@@ -127,7 +127,7 @@ pub fn unpaired(a: &[f64], b: &[f64]) -> Option<Shift> {
     let (m, n) = (a.len() as f64, b.len() as f64);
     let deviation = (m * n * (m + n + 1.0) / 12.0).sqrt();
     let cut = (0.5 * m * n - TWO_SIDED * deviation).floor();
-    Shift::of_sorted(&logs, (cut >= 1.0).then_some(cut as usize - 1))
+    Shift::of_sorted(&logs, (cut >= 1.0).then(|| cut as usize - 1))
 }
 
 /// Standard normal quantile of 1 - [`FALSE_ALARMS`] / 2.

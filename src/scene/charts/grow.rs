@@ -77,10 +77,10 @@ fn project(
         let across = surface.across(triangle);
         across.dot(normal) >= LEAST_COSINE * across.length()
     };
-    // The seed stays in any case, so that every chart has a triangle.
+    // The seed stays in any case, so that every chart has a triangle: one so small that its area is 0 faces nowhere.
     let mean = sum.try_normalize().filter(|&mean| faces(mean, seed));
     let normal = mean.or(surface.across(seed).try_normalize()).unwrap_or(Vec3::Y);
-    let facing: Vec<u32> = grown.iter().copied().filter(|&t| faces(normal, t)).collect();
+    let facing: Vec<u32> = grown.iter().copied().filter(|&t| t == seed || faces(normal, t)).collect();
     let mut is_inside: HashMap<u32, bool> = facing.iter().map(|&t| (t, true)).collect();
     let (u, v) = axes(surface, next_to, normal, &facing, &is_inside);
     let flat = |&t: &u32| surface.corners(t).map(|p| Vec2::new(p.dot(u), p.dot(v)));

@@ -206,7 +206,9 @@ fn read_clips(document: &Document, scene: &mut Scene, tree: &Tree) -> Result<(),
         if let Transform::Matrix(matrix) = *transform {
             document.notes.say("The matrix of an animated node was split into translation, rotation and scale.");
             let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
-            let is_sound = scale.is_finite() && rotation.is_finite() && translation.is_finite();
+            // That of a sheared matrix is none yet.
+            let rotation = rotation.normalize();
+            let is_sound = scale.is_finite() && rotation.is_normalized() && translation.is_finite();
             *transform = match is_sound {
                 true => Transform::Trs { translation, rotation, scale },
                 false => Transform::Trs { translation, rotation: Quat::IDENTITY, scale: Vec3::ZERO },
