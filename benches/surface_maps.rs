@@ -209,7 +209,7 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
     let mut recorder = context.recorder("bench").unwrap();
     shadow_maps.draw(&mut recorder, stage.world, pose, stage.bounds);
     recorder.submit().unwrap();
-    for gather_visibility in [Visibility::Maps, Visibility::Rays, Visibility::None] {
+    for gather_visibility in [Visibility::Maps, Visibility::Checked, Visibility::Rays, Visibility::None] {
         let settings = final_gather::Settings { gather_visibility, ..final_gather::Settings::default() };
         let display = FinalGather::new(context, SIZE.to_array(), settings, ToneSettings::default(), 0).unwrap();
         let from = Gathered {
@@ -226,10 +226,11 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
         let time = seconds(context, 3, |recorder| display.draw(recorder, from, sample, &film));
         let report = display.report(context).unwrap();
         println!(
-            "  {SIZE} pixels by {gather_visibility:?}: {time:.3} s, {:.1} k pixels/s, {:.2} M nodes gathered/s, cut {:.0}",
+            "  {SIZE} pixels by {gather_visibility:?}: {time:.3} s, {:.1} k pixels/s, {:.2} M nodes gathered/s, cut {:.0}, {:.1} rays",
             report.pixels as f64 / time / 1e3,
             report.pixels as f64 * report.mean_cut / time / 1e6,
-            report.mean_cut
+            report.mean_cut,
+            report.mean_rays
         );
     }
 }

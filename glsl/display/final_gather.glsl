@@ -18,6 +18,7 @@ float visibility(vec3 origin, vec3 target, uint leaf);
 struct GatherCount {
     float cut_size;     // nodes gathered from
     float visited;      // nodes looked at
+    float rays;         // cast
     vec3 lost;          // radiance that clamping took, W m^-2 sr^-1
 };
 
@@ -56,7 +57,7 @@ layout(push_constant, scalar) uniform Params {
     float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
     uint jitter;
     uint environment_samples;
-    float map_reach;            // senders nearer than so many of their radii are asked by rays, not by maps
+    float map_reach;            // checked maps are not asked of senders nearer than so many of their radii
 } params;
 
 layout(constant_id = 2) const bool COMPACT = false;
@@ -124,7 +125,7 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
 
     direct_sum = indirect_sum = lost_sum = vec3(0.0);
     gathered_pixel = index;
-    uint node = 0, visited = 0, cut = 0, environment_taken = 0;
+    uint node = 0, visited = 0, cut = 0, rays = 0, environment_taken = 0;
     while (true) {
         // Up to the next arrival that would bring light and needs a ray: threads in lockstep cast theirs together.
         Arrival arrival;
@@ -146,12 +147,14 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
             found = arrival.direct != vec3(0.0);
         }
         if (!found) break;
+        ++rays;
         take(arrival, visibility(origin, arrival.target, arrival.leaf));
     }
     direct[index] += params.weight * direct_sum;
     indirect[index] += params.weight * indirect_sum;
     gather_counts[index].cut_size += params.weight * float(cut);
     gather_counts[index].visited += params.weight * float(visited);
+    gather_counts[index].rays += params.weight * float(rays);
     gather_counts[index].lost += params.weight * lost_sum;
 }
 
@@ -161,7 +164,7 @@ void gather_pixel()
     ivec2 size = textureSize(visible_triangles, 0);
     if (any(greaterThanEqual(pixel, size))) return;
     uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
-    if (params.sample_index == 0) gather_counts[index] = GatherCount(0.0, 0.0, vec3(0.0));
+    if (params.sample_index == 0) gather_counts[index] = GatherCount(0.0, 0.0, 0.0, vec3(0.0));
     uint seen = texelFetch(visible_triangles, pixel, 0).x;
     if (seen == 0 || texelFetch(g_emission, pixel, 0).w <= 0.5) return;
     gather(pixel, index, triangles[seen - 1]);

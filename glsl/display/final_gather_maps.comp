@@ -7,10 +7,11 @@
 #include "trace/holes.glsl"
 
 // One thread per pixel: gathers from the sender tree, seeing by the senders' surface shadow maps, and by our own traversal
-// what stands close by and the environment.                                                      [Ritschel2008 4.4]
+// the environment and, where maps are checked, what they leave in doubt.                                                      [Ritschel2008 4.4]
 // Differs from [Ritschel2008]: there all that the maps hold is asked of them.
 // reads the G-buffer, the sender tree, the maps, the hierarchy and what tells its holes, the environment
 // updates direct, indirect, gather_counts [pixel_count]   shared none
+layout(constant_id = 3) const bool CHECKED = false;
 layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;     // NODE_TEXELS each
 layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_TEXELS each, in leaf order
 layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
@@ -28,16 +29,21 @@ vec3 surface_map_origin(uint place) { return map_origins[place]; }
 
 #include "display/final_gather.glsl"
 
-// A map is seen from the middle of its texel: to receivers close by, other parts of the texel show something else.
+// A map is as fine as its pixels, and seen from the middle of its texel: what these are too coarse for, a ray tells.
 bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
 {
     SenderLeaf shape = sender_shape(leaf);
-    vec3 d = target - origin;
-    float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
-    free = 0.0;
-    if (dot(d, d) < params.map_reach * params.map_reach * radius_squared) return false;
+    uint place = leaf_places[leaf];
+    if (CHECKED) {
+        vec3 d = target - origin;
+        float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
+        bool is_seen, is_far = dot(d, d) >= params.map_reach * params.map_reach * radius_squared;
+        bool is_sure = surface_map_is_sure(map_frame[0], place, map_origins[place], origin, receiver.geometric, is_seen);
+        free = is_seen ? 1.0 : 0.0;
+        return is_far && is_sure;
+    }
     vec2 at = place_on_leaf(shape, target);
-    free = sender_maps_visibility(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], at, origin, receiver.geometric);
+    free = sender_maps_visibility(map_frame[0], place, leaf_neighbours[leaf], at, origin, receiver.geometric);
     return true;
 }
 

@@ -10,6 +10,7 @@
 // stands close by, where their hulls overlap, and the environment.                                              [Ritschel2008 3.3, 4.4]
 // reads the G-buffer, the sender tree, the maps, the objects, the hierarchy and what tells its holes, the environment
 // updates direct, indirect, gather_counts [pixel_count]   shared none
+layout(constant_id = 3) const bool CHECKED = false;
 layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;     // NODE_TEXELS each
 layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_TEXELS each, in leaf order
 layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
@@ -42,9 +43,9 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     SenderLeaf shape = sender_shape(leaf);
     vec3 d = target - origin;
     float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
+    bool is_near = CHECKED && dot(d, d) < params.map_reach * params.map_reach * radius_squared;
     free = 0.0;
-    if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || dot(d, d) < params.map_reach * params.map_reach * radius_squared)
-        return false;
+    if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || is_near) return false;
     uint place = leaf_places[leaf], own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
     RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, place, map_origins[place]);
     free = rigid_visibility(map_frame[0], sender, RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]));

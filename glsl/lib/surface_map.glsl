@@ -75,6 +75,21 @@ float surface_pixel_seen(SurfaceMapFrame frame, SurfaceMapSight sight, uint plac
     return code <= float(surface_map_depth(frame, place, pixel)) ? 1.0 : 0.0;
 }
 
+// Whether the four pixels around the point's direction say the same of it; `is_seen` is what.
+bool surface_map_is_sure(SurfaceMapFrame frame, uint place, vec3 from, vec3 point, vec3 normal, out bool is_seen)
+{
+    vec3 d = point - from;
+    SurfaceMapSight sight = SurfaceMapSight(normal, dot(normal, d), sqrt(dot(d, d)));
+    uint face = cube_face(d);
+    vec2 at = clamp(cube_place(d, face, frame.resolution) - 0.5, vec2(0.0), vec2(float(frame.resolution) - 1.0));
+    uvec2 low = min(uvec2(at), uvec2(frame.resolution - 2));
+    float sum = 0.0;
+    for (uint k = 0; k < 4; ++k)
+        sum += surface_pixel_seen(frame, sight, place, cube_pixel_index(face, low + uvec2(k & 1, k >> 1), frame.resolution));
+    is_seen = sum > 0.0;
+    return sum == 0.0 || sum == 4.0;
+}
+
 // Share of the point that is seen from the texel at `place`, whose map stands at `from`; 0 or 1 unfiltered.
 float surface_map_visibility(SurfaceMapFrame frame, uint place, vec3 from, vec3 point, vec3 normal)
 {

@@ -38,6 +38,9 @@ crate::choice! {
         Auto = "auto",
         /// Surface shadow maps of the senders
         Maps = "maps",
+        /// Surface shadow maps where the method has them, and rays where they leave doubt: to senders close by and where
+        /// the four pixels around disagree
+        Checked = "checked",
         /// Rays, as `--rays` says
         Rays = "rays",
         /// Nothing: all are seen
@@ -62,8 +65,8 @@ crate::settings! {
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
-        /// Senders nearer than so many of their radii are asked by rays where maps are the visibility.
-        gather_map_reach: f32 = 4.0, range 0.0..=1000.0, unit "radii", paper "0: maps alone";
+        /// Checked maps are not asked of senders nearer than so many of their radii, rays are.
+        gather_map_reach: f32 = 4.0, range 0.0..=1000.0, unit "radii", paper "not done";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
@@ -107,6 +110,8 @@ pub struct GatherReport {
     pub largest_cut: f32,
     /// Nodes looked at.
     pub mean_visited: f64,
+    /// Rays cast, per pixel and sample.
+    pub mean_rays: f64,
     /// Radiance that clamping took, mean over the picture, W m^-2 sr^-1.
     pub lost: Vec3,
 }
@@ -115,8 +120,8 @@ impl std::fmt::Display for GatherReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "final gather: {} pixels, cut {:.1} nodes in the mean and {:.0} at most, {:.1} nodes visited",
-            self.pixels, self.mean_cut, self.largest_cut, self.mean_visited
+            "final gather: {} pixels, cut {:.1} nodes in the mean and {:.0} at most, {:.1} nodes visited, {:.1} rays",
+            self.pixels, self.mean_cut, self.largest_cut, self.mean_visited, self.mean_rays
         )?;
         if self.lost != Vec3::ZERO {
             write!(f, "; clamping took {:.3e} W/(m2 sr) in the mean", self.lost.element_sum() / 3.0)?;
@@ -254,7 +259,8 @@ impl FinalGather {
             }};
         }
         let sees_through = settings.gather_visibility == Visibility::None;
-        let by_maps = matches!(settings.gather_visibility, Visibility::Auto | Visibility::Maps);
+        let by_maps = matches!(settings.gather_visibility, Visibility::Auto | Visibility::Maps | Visibility::Checked);
+        let checked = settings.gather_visibility == Visibility::Checked;
         let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = from.tracer;
         if let Some(kept) = &self.kept {
             let alpha_test = surfaces.has_holes;
@@ -274,7 +280,7 @@ impl FinalGather {
                 FinalGatherMoving,
                 FinalGatherMovingParams,
                 surfaces,
-                passes::FinalGatherMovingConstants { alpha_test: surfaces.has_holes, compact },
+                passes::FinalGatherMovingConstants { alpha_test: surfaces.has_holes, compact, checked },
                 bvh_nodes: from.bvh.nodes(),
                 bvh_triangles: from.bvh.triangles(),
                 map_frame: frame,
@@ -289,7 +295,7 @@ impl FinalGather {
                 FinalGatherMaps,
                 FinalGatherMapsParams,
                 surfaces,
-                passes::FinalGatherMapsConstants { alpha_test: surfaces.has_holes, compact },
+                passes::FinalGatherMapsConstants { alpha_test: surfaces.has_holes, compact, checked },
                 bvh_nodes: from.bvh.nodes(),
                 bvh_triangles: from.bvh.triangles(),
                 map_frame: &placed.frame,
@@ -346,6 +352,7 @@ impl FinalGather {
             pixels: gathered.len() as u64,
             mean_cut: gathered.iter().map(|count| f64::from(count.cut_size)).sum::<f64>() / pixels,
             largest_cut: gathered.iter().map(|count| count.cut_size).fold(0.0, f32::max),
+            mean_rays: gathered.iter().map(|count| f64::from(count.rays)).sum::<f64>() / pixels,
             mean_visited: gathered.iter().map(|count| f64::from(count.visited)).sum::<f64>() / pixels,
             lost: counts.iter().map(|count| count.lost).sum::<Vec3>() / counts.len().max(1) as f32,
         })
