@@ -132,7 +132,7 @@ fn an_even_sky_gives_pi_times_its_radiance() {
 #[test]
 fn energy_of_the_cornell_box_is_absorbed_or_escapes() {
     let lost = [1e-4, 1e-5].map(lost_of_what_is_shot);
-    assert!(lost[1].abs() < 0.01 && lost[1].abs() < 0.6 * lost[0].abs(), "{lost:?}");
+    assert!(lost[1].abs() < 0.01 && lost[1].abs() < 0.8 * lost[0].abs(), "{lost:?}");
 }
 
 fn lost_of_what_is_shot(threshold: f32) -> f64 {
@@ -156,7 +156,7 @@ fn lost_of_what_is_shot(threshold: f32) -> f64 {
             let albedo = f64::from(leaf.element.albedo.x);
             absorbed += area * (1.0 - albedo) * arrived;
             let sent = area * (albedo * arrived + f64::from(PI * leaf.element.emission.x));
-            let rays = 8;
+            let rays = 4;
             for _ in 0..rays {
                 let (u, v) = (random.unit().sqrt(), random.unit());
                 let from = a * (1.0 - u) + b * (u * (1.0 - v)) + c * (u * v);
