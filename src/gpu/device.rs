@@ -200,14 +200,10 @@ impl Device {
                     () if has(khr::calibrated_timestamps::NAME) => {
                         Some(CalibratedTimestamps::Khr(khr::calibrated_timestamps::Device::new(&instance.raw, &raw)))
                     }
-                    () if has(ext::calibrated_timestamps::NAME) => {
-                        Some(CalibratedTimestamps::Ext(ext::calibrated_timestamps::Device::new(&instance.raw, &raw)))
-                    }
-                    () => None,
+                    () => Some(CalibratedTimestamps::Ext(ext::calibrated_timestamps::Device::new(&instance.raw, &raw))),
                 },
                 device_fault: optional.device_fault.then(|| ext::device_fault::Device::new(&instance.raw, &raw)),
-                buffer_marker: (optional.buffer_marker && has(amd::buffer_marker::NAME))
-                    .then(|| amd::buffer_marker::Device::new(&instance.raw, &raw)),
+                buffer_marker: optional.buffer_marker.then(|| amd::buffer_marker::Device::new(&instance.raw, &raw)),
                 dynamic_rendering: has(khr::dynamic_rendering::NAME)
                     .then(|| khr::dynamic_rendering::Device::new(&instance.raw, &raw)),
                 synchronization2: has(khr::synchronization2::NAME)
