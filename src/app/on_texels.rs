@@ -36,7 +36,7 @@ pub struct LightmapShown<'a> {
 }
 
 enum Shown {
-    FinalGather(FinalGather),
+    FinalGather(Box<FinalGather>),
     Lightmap(Box<Lightmap>),
 }
 
@@ -48,7 +48,8 @@ impl Shown {
         let size = [request.width, request.height];
         let settings = request.final_gather_settings()?;
         check_visibility(request, settings.gather_visibility, method.maps.is_some())?;
-        Ok(Self::FinalGather(FinalGather::new(context, size, settings, request.tone, request.seed)?))
+        let display = FinalGather::new(context, size, settings, request.tone, request.seed)?;
+        Ok(Self::FinalGather(Box::new(display)))
     }
 }
 

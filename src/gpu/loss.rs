@@ -248,9 +248,11 @@ impl Context {
         let mut addresses = vec![vk::DeviceFaultAddressInfoEXT::default(); counts.address_info_count as usize];
         let mut vendor = vec![vk::DeviceFaultVendorInfoEXT::default(); counts.vendor_info_count as usize];
         counts.vendor_binary_size = 0;
-        let mut info = vk::DeviceFaultInfoEXT::default();
-        info.p_address_infos = addresses.as_mut_ptr();
-        info.p_vendor_infos = vendor.as_mut_ptr();
+        let mut info = vk::DeviceFaultInfoEXT {
+            p_address_infos: addresses.as_mut_ptr(),
+            p_vendor_infos: vendor.as_mut_ptr(),
+            ..Default::default()
+        };
         // SAFETY: both lists have the lengths that the counts say.
         let told = unsafe { tell(handle, &mut counts, &mut info) };
         if !matches!(told, vk::Result::SUCCESS | vk::Result::INCOMPLETE) {

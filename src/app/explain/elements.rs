@@ -155,7 +155,7 @@ fn of_splats(splats: &[Splat], surface: u32, seen: &Seen, stage: &Stage) -> Opti
     let eye = seen.view.eye;
     let mut shares: Vec<(u32, f32)> = Vec::new();
     for splat in splats.iter().filter(|splat| splat.surface == surface) {
-        let (u, v) = (Vec3::from(splat.half_u), Vec3::from(splat.half_v));
+        let (u, v) = (splat.half_u, splat.half_v);
         let offset = seen.position - splat.center;
         let along =
             |half: Vec3| (1.0 - offset.dot(half).abs() / (SPLAT_REACH * half.length_squared().max(1e-30))).max(0.0);

@@ -67,8 +67,8 @@ pub fn explain(
         let whole = all[slot].reflected.as_dvec3();
         let part = weight * sender.indirect.as_dvec3();
         let mut before = DVec3::ZERO;
-        for bounce in 1..reflected.len() {
-            let now = reflected[bounce][slot].as_dvec3();
+        for (bounce, light) in reflected.iter().enumerate().skip(1) {
+            let now = light[slot].as_dvec3();
             let share = (now - before) / whole;
             let share = DVec3::select(whole.cmpeq(DVec3::ZERO), DVec3::ZERO, share);
             add(parts, key(Light::Indirect, bounce as u32), part * share);

@@ -120,11 +120,11 @@ const FRAMES: &str = "60";
 
 #[test]
 fn frames_with_everything_moving_allocate_nothing() {
-    const WARM_UP: u32 = 8;
+    const WARM_UP: u32 = 3;
     let frames: u32 = std::env::var("LINKLIGHT_FRAMES").as_deref().unwrap_or(FRAMES).parse().unwrap();
     let context = context();
     // Links of all elements in every frame take their time.
-    for (method, frames) in [("path-tracing", frames), ("implicit-visibility --set bins=4", frames.div_ceil(4))] {
+    for (method, frames) in [("path-tracing", frames), ("implicit-visibility --set bins=4", frames.div_ceil(8))] {
         let mut engine = Engine::new(&context);
         let (mut made, mut held) = ((0, 0), 0);
         let mut last = (Vec::new(), Vec::new());
