@@ -164,7 +164,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 /// Figures without numbers.
-fn pictures() -> [Row; 5] {
+fn pictures() -> [Row; 6] {
     let shown = |scene: &str, options: &str| {
         format!("builtin:{scene} {METHOD_OPTION} --bounces 1 --size 240x150 --spp 4 {options}")
     };
@@ -178,6 +178,21 @@ fn pictures() -> [Row; 5] {
             &["tea-room", "office"].map(|scene| (scene, shown(scene, "--set visibility=rays --display final-gather"))),
         )
         .slow(),
+        Row::views(
+            METHOD,
+            "Fig. 3, 6 and 7",
+            (
+                "charts of the atlas, the walk over its texels, the depth map of one",
+                "zig-zag and spiral walks over charts",
+            ),
+            "bunny, Cornell box",
+            &[
+                ("charts", shown("cornell-box", "--view atlas")),
+                ("spiral", shown("cornell-box", "--view traversal-order --set sequence=spiral")),
+                ("zig-zag", shown("cornell-box", "--view traversal-order --set sequence=zig-zag")),
+                ("depth cube map", shown("cornell-box", "--view depth-map --set pick=120,110")),
+            ],
+        ),
         Row::views(
             METHOD,
             "Fig. 11",
@@ -211,8 +226,8 @@ fn pictures() -> [Row; 5] {
         .slow(),
         Row::not(
             METHOD,
-            "Fig. 2, 3, 4, 6, 8, 9 and 10",
-            "maps, queries, traversals and the tree",
+            "Fig. 2, 4, 8, 9 and 10",
+            "limits of maps from outside, queries, the tree",
             "drawings that explain the algorithm",
         ),
     ]
