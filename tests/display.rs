@@ -15,7 +15,7 @@ use linklight::scene::deform::world_vertices;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
-use linklight::scene::{LightKind, Scene};
+use linklight::scene::{Image, LightKind, Material, Node, Scene, Texture, TextureRef, Wrap};
 use linklight::stages::film::Film;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
@@ -166,6 +166,53 @@ fn an_occluder_shades_exactly_what_it_hides() {
                 }
             }
         }
+    }
+}
+
+/// Half of the square is cut out by its texture, half stands: at x < 0. The sun throws its shadow 0.7 m aside, out from
+/// under it.
+#[test]
+fn a_mask_shades_where_it_is_not_cut_out() {
+    let context = TestContext::new();
+    let view = view(Vec3::new(0.0, 3.0, 1e-3), Vec3::NEG_Z, 0.4);
+    for (kind, direction, reach, shift) in [
+        (LightKind::Point, Vec3::NEG_Y, 0.8, 0.0),
+        (LightKind::Directional, Vec3::new(0.7, -1.5, 0.0).normalize(), 0.2, 0.7),
+    ] {
+        let mut base = floor(0.5, 4.0, 1);
+        let square = parallelogram(Vec3::new(-0.2, 1.5, 0.2), Vec3::X * 0.4, Vec3::NEG_Z * 0.4, 1, 1);
+        let rgba = vec![255, 255, 255, 255, 255, 255, 255, 0];
+        base.images = vec![Image { name: "half".into(), width: 2, height: 1, rgba, srgb: false }];
+        base.textures = vec![Texture {
+            image: 0,
+            wrap: [Wrap::ClampToEdge; 2],
+            mag_linear: false,
+            min_linear: false,
+            mipmapped: false,
+            mip_linear: false,
+        }];
+        let base_color_texture =
+            Some(TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] });
+        let mut mask = Material { base_color_texture, alpha_cutoff: Some(0.5), ..lambert(Vec3::ONE) };
+        mask.base_color.w = 0.7;
+        base.materials.push(mask);
+        base.nodes.push(Node { mesh: Some(base.meshes.len() as u32), ..Node::default() });
+        base.meshes.extend(scene(vec![], vec![square], &[]).meshes);
+        let hidden = with_light(base, kind, 5.0, Vec3::new(0.0, 2.0, 0.0), direction);
+        let shown = show(&context, &hidden, &view, 1, 0.0, 0.0);
+        let mut counts = [0; 2];
+        for (i, direct) in shown.direct.iter().enumerate().filter(|(i, _)| shown.depth[*i] > 2.5) {
+            let pixel = Vec2::new((i as u32 % SIZE) as f32, (i as u32 / SIZE) as f32);
+            let ray = view.ray(pixel + 0.5, UVec2::splat(SIZE));
+            let point = ray.origin - ray.origin.y / ray.direction.y * ray.direction;
+            let x = point.x - shift;
+            let edge = (x.abs().max(point.z.abs()) - reach).max(x);
+            if edge.abs() > 0.03 {
+                assert_eq!(*direct == Vec3::ZERO, edge < 0.0, "{kind:?} at {point}: {direct}");
+                counts[usize::from(edge < 0.0)] += 1;
+            }
+        }
+        assert!(counts.iter().all(|count| *count > 10), "{kind:?}: pixels lit and in shadow {counts:?}");
     }
 }
 
