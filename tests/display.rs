@@ -4,7 +4,7 @@ mod common;
 
 use common::TestContext;
 use common::scenes::{lambert, light, parallelogram, scene};
-use glam::{UVec2, Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3, Vec4};
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
@@ -180,8 +180,11 @@ fn a_mask_shades_where_it_is_not_cut_out() {
         (LightKind::Directional, Vec3::new(0.7, -1.5, 0.0).normalize(), 0.2, 0.7),
     ] {
         let mut base = floor(0.5, 4.0, 1);
-        let square = parallelogram(Vec3::new(-0.2, 1.5, 0.2), Vec3::X * 0.4, Vec3::NEG_Z * 0.4, 1, 1);
-        let rgba = vec![255, 255, 255, 255, 255, 255, 255, 0];
+        let mut square = parallelogram(Vec3::new(-0.2, 1.5, 0.2), Vec3::X * 0.4, Vec3::NEG_Z * 0.4, 1, 1);
+        // What is multiplied to 0.72 and 0.36 lies on one side of the cutoff where a factor is missed.
+        square.colors = vec![Vec4::new(1.0, 1.0, 1.0, 0.8); square.positions.len()];
+        square.uv[1] = square.uv[0].iter().map(|uv| Vec2::new(1.0 - uv.x, uv.y)).collect();
+        let rgba = vec![255, 255, 255, 255, 255, 255, 255, 128];
         base.images = vec![Image { name: "half".into(), width: 2, height: 1, rgba, srgb: false }];
         base.textures = vec![Texture {
             image: 0,
@@ -193,8 +196,8 @@ fn a_mask_shades_where_it_is_not_cut_out() {
         }];
         let base_color_texture =
             Some(TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] });
-        let mut mask = Material { base_color_texture, alpha_cutoff: Some(0.5), ..lambert(Vec3::ONE) };
-        mask.base_color.w = 0.7;
+        let mut mask = Material { base_color_texture, alpha_cutoff: Some(0.5), ..lambert(Vec3::splat(0.2)) };
+        mask.base_color.w = 0.9;
         base.materials.push(mask);
         base.nodes.push(Node { mesh: Some(base.meshes.len() as u32), ..Node::default() });
         base.meshes.extend(scene(vec![], vec![square], &[]).meshes);
