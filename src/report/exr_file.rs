@@ -15,7 +15,7 @@ use exr::prelude::{
 };
 use glam::Vec3;
 
-use super::image::{Channel, Metadata, Picture, PictureError, check_length, check_size};
+use super::image::{Channel, MAX_SIDE, Metadata, Picture, PictureError, check_length, check_size};
 use super::write::{FileError, write_whole};
 use crate::files::{File, decode};
 
@@ -69,6 +69,13 @@ pub(super) fn read(path: &Path, max_pixels: u64) -> Result<Picture, PictureError
     for header in &headers.headers {
         let [width, height] = [header.layer_size.width(), header.layer_size.height()].map(|side| side as u64);
         check_size(path, width, height, max_pixels)?;
+        // The decoder's tables grow with the stated tiles, however small the picture is.
+        if let exr::meta::BlockDescription::Tiles(tiles) = header.blocks {
+            let side = tiles.tile_size.x().max(tiles.tile_size.y());
+            if side > MAX_SIDE as usize {
+                return Err(fail(format!("its tiles are {side} pixels a side, at most {MAX_SIDE} are read")));
+            }
+        }
         samples = samples.saturating_add((width * height).saturating_mul(header.channels.list.len() as u64));
     }
     // All parts are decoded at once, each channel for itself.
