@@ -39,7 +39,7 @@ fn a_lost_gpu_ends_every_method_with_the_pass_it_had_come_to() {
     for (method, pass, scope) in [
         ("explicit-visibility", "gather/links@2", "bounce 2"),
         ("implicit-visibility", "methods/implicit_visibility/resolve", "implicit-visibility"),
-        ("antiradiance", "methods/antiradiance/local", "antiradiance"),
+        ("antiradiance", "methods/antiradiance/local_exitant", "antiradiance"),
         ("surface-shadow-maps --set keep_maps=false --set atlas_resolution=16", "display/direct", "frame"),
         ("face-cluster", "display/irradiance_vector", "frame"),
         ("path-tracing", "methods/path_tracing/scatter", "path-tracing"),
