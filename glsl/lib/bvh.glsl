@@ -7,6 +7,7 @@
 //     bool is_hole(uint triangle, vec2 barycentrics)      true where an alpha mask lets the ray pass
 #include "lib/bvh_pack.glsl"
 #include "lib/ray.glsl"
+#include "lib/two_surfaces.glsl"
 
 uvec4 bvh_node_texel(uint i);
 uvec4 bvh_triangle_texel(uint i);
@@ -70,21 +71,6 @@ bool intersect_triangle(RayFrame frame, uint slot, bool wanted, float t_min, ino
     hit.triangle = found ? triangle | (determinant < 0 ? BACK_FACE : 0u) : hit.triangle;
     hit.barycentrics = found ? barycentrics : hit.barycentrics;
     return found;
-}
-
-// How far behind a hit the next one counts as another surface.
-float next_surface(float t, float gap) { return t * 1.000002 + gap; }
-
-// Of the two nearest hits so far and one that is nearer than the second, which `hit` is now and `before` was.
-void keep_both(Hit before, float gap, inout Hit first, inout Hit hit)
-{
-    Hit found = hit;
-    if (found.t < first.t) {
-        hit = is_hit(first) && first.t >= next_surface(found.t, gap) ? first : before;
-        first = found;
-    } else if (found.t < next_surface(first.t, gap)) {
-        hit = before;
-    }
 }
 
 void sort(inout uint a, inout uint b)
