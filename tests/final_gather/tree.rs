@@ -2,7 +2,9 @@
 
 use crate::common::{Random, TestContext};
 use glam::Vec3;
-use linklight::stages::sender_tree::{self, Representative, SenderTree, TreeOptions, parallelogram, triangle};
+use linklight::stages::sender_tree::{
+    self, Representative, SenderTree, TreeOptions, VertexElements, VertexLeaves, parallelogram, triangle,
+};
 
 /// Power of every node and the leaf that stands for it, by walking below it.
 fn pull(tree: &SenderTree, areas: &[f32], emitted: &[Vec3], reflected: &[Vec3]) -> Vec<(Vec3, Vec3)> {
@@ -107,4 +109,57 @@ fn what_nobody_sees_does_not_adapt_the_eye() {
     assert!((half_dark / adaptation(&areas, &reflected) - 1.0).abs() < 1e-3);
     assert!((half_dark / all_lit - 1.0).abs() < 0.2, "{half_dark} for {all_lit}: the dark half counts");
     assert_eq!(adapted(&vec![Vec3::ZERO; leaves.len()]), 0.0);
+}
+
+#[test]
+fn triangles_send_the_mean_of_the_elements_at_their_corners() {
+    let context = TestContext::new();
+    let random = &mut Random(77);
+    let mut vectors = |count: usize, scale: f32| -> Vec<Vec3> {
+        (0..count).map(|_| scale * Vec3::new(random.unit(), random.unit(), random.unit())).collect()
+    };
+    // A strip; its second half has backs, whose elements stand after those of all fronts.
+    let (vertex_count, triangle_count) = (80u32, 78);
+    let positions = vectors(vertex_count as usize, 3.0);
+    let triangles: Vec<[u32; 3]> = (0..triangle_count).map(|i| [i, i + 1, i + 2]).collect();
+    let back_elements: Vec<u32> =
+        (0..vertex_count).map(|v| if v < 40 { u32::MAX } else { vertex_count + v - 40 }).collect();
+    let values: [Vec<Vec3>; 5] = std::array::from_fn(|k| vectors(120, 1.0 + k as f32));
+    let [emission, albedo, punctual, direct, indirect] =
+        values.each_ref().map(|values| context.upload("test/elements", values).unwrap());
+    let elements = VertexElements {
+        emission: &emission,
+        albedo: &albedo,
+        punctual: &punctual,
+        direct: &direct,
+        indirect: &indirect,
+    };
+    let leaves = VertexLeaves::new(&context, &positions, &triangles, &back_elements, TreeOptions::default()).unwrap();
+    let twin = |owner: usize| {
+        let (corners, is_back) = match owner.checked_sub(triangles.len()) {
+            None => (triangles[owner], false),
+            Some(back) => (triangles[40 + back], true),
+        };
+        let element = |v: u32| if is_back { back_elements[v as usize] as usize } else { v as usize };
+        let mean = |of: &dyn Fn(usize) -> Vec3| corners.iter().map(|v| of(element(*v))).sum::<Vec3>() / 3.0;
+        let [emission, albedo, punctual, direct, indirect] = &values;
+        let emitted = std::f32::consts::PI * mean(&|e| emission[e]);
+        (emitted, mean(&|e| albedo[e] * (punctual[e] + direct[e] + indirect[e])))
+    };
+    assert_eq!(leaves.tree.leaf_count() as usize, 78 + 38);
+    for has_reflected in [true, false] {
+        let mut recorder = context.recorder("test").unwrap();
+        leaves.fill(&mut recorder, elements, has_reflected);
+        recorder.submit().unwrap();
+        for (light, owner) in
+            context.download(&leaves.tree.leaf_light).unwrap().iter().zip(&leaves.tree.topology.leaf_order)
+        {
+            let (emitted, reflected) = twin(*owner as usize);
+            let reflected = if has_reflected { reflected } else { Vec3::ZERO };
+            assert!(light.emitted.distance(emitted) <= 1e-5 * emitted.length(), "leaf {owner}: {light:?}");
+            assert!(light.reflected.distance(reflected) <= 1e-5 * reflected.length(), "leaf {owner}: {light:?}");
+        }
+    }
+    // Another triangle's light is told apart.
+    assert!(twin(3).1.distance(twin(4).1) > 0.01 && twin(78).0.distance(twin(40).0) > 0.01);
 }
