@@ -87,7 +87,7 @@ impl Case {
             // Elements in another order than leaves, backs among them.
             leaf_elements: (0..all).rev().collect(),
             element_vertices: (0..all)
-                .map(|element| element / 2 | if element % 2 == 1 { BACK_SIDE } else { 0 })
+                .map(|element| (element / 2) | if element % 2 == 1 { BACK_SIDE } else { 0 })
                 .collect(),
             lobes: (0..all.div_ceil(2)).map(|_| lobe(random)).collect(),
             receivers,

@@ -44,7 +44,7 @@ fn lights(random: &mut Random) -> Vec<Light> {
 }
 
 fn point(texel: &AtlasTexel, k: u32) -> Vec3 {
-    let u = (Vec2::splat(0.5) + k as f32 * Vec2::new(0.754_877_66, 0.569_840_29)).fract() - 0.5;
+    let u = (Vec2::splat(0.5) + k as f32 * Vec2::new(0.754_877_7, 0.569_840_3)).fract() - 0.5;
     texel.position + u.x * texel.side_u + u.y * texel.side_v
 }
 
