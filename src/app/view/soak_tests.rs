@@ -139,6 +139,7 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
         }
     }
     println!("{scene} {method}: {frames} frames in {:.0?}, bytes at rest {levels:?}", start.elapsed());
-    assert!(levels.iter().all(|level| level == &levels[0]), "{scene} {method}: memory grows: {levels:?}");
+    // By the second sample everything that is kept for further use was made.
+    assert!(levels[1..].iter().all(|level| level == &levels[1]), "{scene} {method}: memory grows: {levels:?}");
     assert_eq!(context.validation_messages(), [""; 0], "{scene} {method}");
 }

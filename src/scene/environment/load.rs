@@ -193,6 +193,7 @@ fn decode_exr(path: &Path, bytes: &[u8], limits: &EnvironmentLimits) -> Result<D
     let read = || exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| error.to_string());
     let metadata = decode(read).map_err(failed)?;
     for header in &metadata.headers {
+        check_size(path, [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64), bytes.len(), limits)?;
         // The decoder's tables grow with the stated tiles, however small the picture is.
         if let exr::meta::BlockDescription::Tiles(tiles) = header.blocks {
             let side = tiles.tile_size.x().max(tiles.tile_size.y());
@@ -203,7 +204,6 @@ fn decode_exr(path: &Path, bytes: &[u8], limits: &EnvironmentLimits) -> Result<D
                 )));
             }
         }
-        check_size(path, [header.layer_size.x(), header.layer_size.y()].map(|side| side as u64), bytes.len(), limits)?;
     }
     let image = decode(|| {
         exr::image::read::read()
