@@ -31,7 +31,7 @@ pub struct Quadtrees {
     pub cell_corners: Buffer<CellCorner>,
     /// One per node.
     walk: Buffer<WalkStep>,
-    /// The same with what a walk looks at, [`WALK_TEXELS`] per node.
+    /// The same with what a walk looks at, `WALK_TEXELS` per node.
     pub walk_texels: TexelBuffer,
 }
 
