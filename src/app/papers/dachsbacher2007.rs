@@ -32,7 +32,7 @@ struct Scene {
 const SCENES: [Scene; 3] = [
     Scene {
         on: "Office, 18.2k elements",
-        run: "builtin:office --elements 12200 --set refinement=29",
+        run: "builtin:office --elements 12200 --set refinement=34",
         links: 632e3,
         link_seconds: 8.7,
         local_ms: 7.1,
@@ -44,7 +44,7 @@ const SCENES: [Scene; 3] = [
     },
     Scene {
         on: "Character, 19.7k elements",
-        run: "builtin:dancer --elements 13000 --set refinement=14",
+        run: "builtin:dancer --elements 13000 --set refinement=33",
         links: 661e3,
         link_seconds: 13.1,
         local_ms: 8.2,
@@ -56,7 +56,7 @@ const SCENES: [Scene; 3] = [
     },
     Scene {
         on: "Oriental, 15.6k elements",
-        run: "builtin:tea-room --elements 10400 --set refinement=14",
+        run: "builtin:tea-room --elements 10400 --set refinement=21",
         links: 776e3,
         link_seconds: 13.0,
         local_ms: 10.8,
