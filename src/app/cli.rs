@@ -75,6 +75,24 @@ pub struct Global {
     pub verbose: u8,
 }
 
+#[cfg(test)]
+impl Global {
+    /// What a command line says that has none of them.
+    pub const UNSAID: Self = Self {
+        gpu: None,
+        validate: false,
+        full_barriers: false,
+        small_device: false,
+        max_memory: None,
+        gpu_timeout: None,
+        crash_file: None,
+        lose_device_at: None,
+        pass_times: true,
+        quiet: false,
+        verbose: 0,
+    };
+}
+
 impl Global {
     pub fn verbosity(&self) -> Verbosity {
         match (self.quiet, self.verbose) {

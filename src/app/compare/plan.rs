@@ -218,22 +218,8 @@ mod tests {
 
     fn plan<'a>(variations: &'a [Variation], set: &'a [Assignment], options: &'a [String]) -> Plan<'a> {
         let methods = vec![find("explicit-visibility").unwrap(), find(REFERENCE).unwrap()];
-        Plan { methods, variations, set, options, global: &GLOBAL }
+        Plan { methods, variations, set, options, global: &Global::UNSAID }
     }
-
-    const GLOBAL: Global = Global {
-        gpu: None,
-        validate: false,
-        full_barriers: false,
-        small_device: false,
-        max_memory: None,
-        gpu_timeout: None,
-        crash_file: None,
-        lose_device_at: None,
-        pass_times: true,
-        quiet: false,
-        verbose: 0,
-    };
 
     fn texts(words: &[&str]) -> Vec<String> {
         words.iter().map(|word| (*word).to_owned()).collect()

@@ -258,20 +258,6 @@ fn parse(line: &str, folder: &Path, global: &Global) -> Result<[Run; 2], AppErro
 mod tests {
     use super::*;
 
-    const GLOBAL: Global = Global {
-        gpu: None,
-        validate: false,
-        full_barriers: false,
-        small_device: false,
-        max_memory: None,
-        gpu_timeout: None,
-        crash_file: None,
-        lose_device_at: None,
-        pass_times: true,
-        quiet: false,
-        verbose: 0,
-    };
-
     #[test]
     fn every_run_of_every_row_is_understood() {
         let folder = tempfile::tempdir().unwrap();
@@ -281,7 +267,8 @@ mod tests {
             assert!(methods::find(row.method).is_some_and(|method| !method.paper.key.is_empty()), "{}", row.method);
             assert!(!row.runs().is_empty() || matches!(row.ours, Ours::Not(_)), "{} {}", row.place, row.what);
             for run in row.runs() {
-                let [run, reference] = parse(run, folder.path(), &GLOBAL).unwrap_or_else(|e| panic!("{run}: {e}"));
+                let [run, reference] =
+                    parse(run, folder.path(), &Global::UNSAID).unwrap_or_else(|e| panic!("{run}: {e}"));
                 assert_eq!(run.request.method.key, row.method);
                 assert_eq!(run.request.bounces, reference.request.bounces);
             }
@@ -291,11 +278,11 @@ mod tests {
     #[test]
     fn references_are_shared_where_settings_alone_differ() {
         let folder = tempfile::tempdir().unwrap();
-        let path = |line: &str| parse(line, folder.path(), &GLOBAL).unwrap()[1].request.output.path.clone();
+        let path = |line: &str| parse(line, folder.path(), &Global::UNSAID).unwrap()[1].request.output.path.clone();
         let coarse = path("builtin:maze --method antiradiance --bounces 2 --size 8x8 --elements 900 --set bins=128");
         let fine = path("builtin:maze --method antiradiance --bounces 2 --size 8x8 --set bins=512");
         assert_eq!(coarse, fine);
         assert_ne!(coarse, path("builtin:maze --method antiradiance --bounces 3 --size 8x8"));
-        assert!(parse("builtin:maze", folder.path(), &GLOBAL).is_err());
+        assert!(parse("builtin:maze", folder.path(), &Global::UNSAID).is_err());
     }
 }
