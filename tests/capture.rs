@@ -175,6 +175,34 @@ fn a_capture_shows_the_last_frame_in_words() {
     check_capture(folder.path(), "--method path-tracing --spp 2", &["frame > path-tracing"]);
 }
 
+/// Frames and the writing of the capture, in the order in which they happened.
+#[test]
+fn the_frame_that_is_named_is_captured() {
+    if !is_installed("renderdoccmd", "renderdoc") {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "render builtin:cornell-box --size 8x8 --method path-tracing --spp 1 --frames 3 --quiet -o a.exr";
+    let capture = format!("{scene} --capture frame.rdc --trace a.json --capture-frame");
+    succeed(linklight(folder.path(), &format!("{capture} 2")));
+    assert!(std::fs::read(folder.path().join("frame.rdc")).unwrap().starts_with(b"RDOC"));
+    let trace: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let mut spans: Vec<(f64, &str)> = trace["traceEvents"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|event| Some((event["ts"].as_f64()?, event["name"].as_str()?)))
+        .filter(|(_, name)| *name == "write capture" || name.len() == 7 && name.starts_with("frame "))
+        .collect();
+    spans.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let names: Vec<&str> = spans.into_iter().map(|(_, name)| name).collect();
+    assert_eq!(names, ["frame 1", "frame 2", "write capture", "frame 3"]);
+
+    let refused = linklight(folder.path(), &format!("{capture} 4")).output().unwrap();
+    assert!(refused.status.code() == Some(2) && text(&refused).contains("there are 3 frames"), "{}", text(&refused));
+}
+
 /// The loader is shown no layers of the system: as if RenderDoc were not there.
 #[test]
 fn without_renderdoc_nothing_is_rendered_and_the_message_says_what_to_install() {

@@ -242,6 +242,9 @@ pub struct RenderArgs {
     /// Write a RenderDoc capture of the last frame
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+    /// ... or of this one, counted from 1
+    #[arg(long, value_name = "N", requires = "capture", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub capture_frame: Option<u32>,
     /// A further GPU that makes links, by part of its name or index (explicit-visibility); the picture stays the same, bit
     /// for bit, on GPUs of one driver; may be repeated
     #[arg(long, value_name = "NAME|INDEX")]
@@ -273,9 +276,21 @@ pub struct ViewArgs {
     /// Start with the panels hidden: the picture fills the window
     #[arg(long)]
     pub bare: bool,
-    /// Write a RenderDoc capture of the first picture in full quality
+    /// Write a RenderDoc capture of the first picture in full quality, made once more when all is prepared
     #[arg(long, value_name = "FILE.rdc")]
     pub capture: Option<PathBuf>,
+    /// ... or of this picture, counted from 1, with everything that was made for it
+    #[arg(long, value_name = "N", requires = "capture", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub capture_frame: Option<u32>,
+    /// A further GPU that makes links, as in `linklight render`; may be repeated
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub link_gpu: Vec<String>,
+    /// Write times, bytes and counters of every pass of the last pictures as JSON when the window is closed
+    #[arg(long, value_name = "FILE.json")]
+    pub profile: Option<PathBuf>,
+    /// ... and their time line, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE.trace.json")]
+    pub trace: Option<PathBuf>,
     /// Watch this folder of shaders, a checkout's glsl, and take what changes; errors are shown over the picture
     #[arg(long, value_name = "DIR")]
     pub shaders: Option<PathBuf>,

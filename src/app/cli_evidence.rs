@@ -209,6 +209,12 @@ pub struct BakeArgs {
     /// Rays of each texel, for light by direction
     #[arg(long, value_name = "N", default_value_t = 256, value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub directions: u32,
+    /// Write times, bytes and counters of every pass as JSON
+    #[arg(long, value_name = "FILE.json")]
+    pub profile: Option<PathBuf>,
+    /// Write a time line of CPU and GPU for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE.trace.json")]
+    pub trace: Option<PathBuf>,
     /// Options of `linklight render`, such as -- --bounces 2 --elements 50000 --indirect-only
     #[arg(last = true, value_name = "RENDER OPTIONS")]
     pub options: Vec<String>,

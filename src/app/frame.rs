@@ -117,7 +117,7 @@ impl Method {
                     Helper::new(options, &own, &stage.pose, settings).map_err(AppError::failed)
                 };
                 let helpers: Vec<Helper> = request.link_gpus.iter().map(helper).collect::<Result<_, _>>()?;
-                let method = ExplicitVisibility::prepare_over(context, &own, settings, &helpers);
+                let method = ExplicitVisibility::prepare_over(context, &own, settings, helpers);
                 let method = method.map_err(AppError::failed)?;
                 tracing::info!("{}", method.report());
                 Self::on_elements(context, request, stage, Box::new(method))

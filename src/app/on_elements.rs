@@ -6,7 +6,7 @@ use crate::methods::antiradiance::{Antiradiance, Scheme};
 use crate::methods::carried::Carried;
 use crate::methods::explicit_visibility::{ExplicitVisibility, Stage};
 use crate::methods::implicit_visibility::ImplicitVisibility;
-use crate::methods::pick::picked_element;
+use crate::methods::pick::{Pick, picked_element};
 use crate::scene::camera::View;
 use crate::stages::elements::Elements;
 use crate::stages::splats::Splats;
@@ -52,19 +52,23 @@ pub trait OnElements {
     /// Angle between normals, radians, below which neighbours' indirect light is averaged; `None` without smoothing.
     fn smoothing(&self) -> Option<f32>;
 
-    /// Whether [`Self::carried_to`] tells links.
-    fn keeps_links(&self) -> bool {
-        false
-    }
-
     /// Whether a solve of fewer bounces is the first part of one of more.
     fn bounces_are_apart(&self) -> bool {
         true
     }
 
-    /// What an element received in the last bounce of the last solve, link by link.
-    fn carried_to(&self, _: &Context, _: u32) -> Result<Vec<Carried>, AppError> {
-        Ok(Vec::new())
+    /// Lets solves keep what [`Self::carried_to`] needs, or no longer.
+    fn keep_sent(&mut self, _: &Context, _: bool) -> Result<(), AppError> {
+        Ok(())
+    }
+
+    /// What each of `elements` received in the last bounce of the last solve, link by link; in all of them if
+    /// [`Self::bounces_add_up`].
+    fn carried_to(&self, context: &Context, elements: &[u32]) -> Result<Vec<Vec<Carried>>, AppError>;
+
+    /// Whether each bounce sends the light of those before again.
+    fn bounces_add_up(&self) -> bool {
+        false
     }
 
     /// Flat patches for the splatting display, if the method has them.
@@ -76,6 +80,21 @@ pub trait OnElements {
     fn false_colors(&self, _: &Context, _: &World, _: &View, _: UVec2) -> Result<Option<Buffer<Vec3>>, AppError> {
         Ok(None)
     }
+}
+
+/// The element that a view is about.
+fn picked(
+    context: &Context,
+    world: &World,
+    elements: &Elements,
+    pick: Pick,
+    view: &View,
+    size: UVec2,
+) -> Result<Option<u32>, AppError> {
+    let Pick::Pixel { .. } = pick else { return Ok(picked_element(pick, &[], &[], &[], view, size)) };
+    let positions = context.download(&world.positions)?;
+    let triangles = context.download(&world.triangles)?;
+    Ok(picked_element(pick, &positions, &triangles, &elements.topology.back_elements, view, size))
 }
 
 /// What every method offers under the same names.
@@ -135,16 +154,23 @@ impl OnElements for ExplicitVisibility {
         self.is_stale().then(|| self.oldest_link())
     }
 
-    fn false_colors(&self, context: &Context, _: &World, _: &View, _: UVec2) -> Result<Option<Buffer<Vec3>>, AppError> {
-        Ok(self.view_colors().map(|colors| context.upload("explicit/view colors", &colors)).transpose()?)
+    fn false_colors(
+        &self,
+        context: &Context,
+        world: &World,
+        view: &View,
+        size: UVec2,
+    ) -> Result<Option<Buffer<Vec3>>, AppError> {
+        if !self.shows_view() {
+            return Ok(None);
+        }
+        let picked = picked(context, world, self.elements(), self.settings().pick, view, size)?;
+        let colors = self.view_colors(context, picked)?;
+        Ok(colors.map(|colors| context.upload("explicit/view colors", &colors)).transpose()?)
     }
 
-    fn keeps_links(&self) -> bool {
-        true
-    }
-
-    fn carried_to(&self, context: &Context, element: u32) -> Result<Vec<Carried>, AppError> {
-        Ok(Self::carried_to(self, context, element)?)
+    fn carried_to(&self, context: &Context, elements: &[u32]) -> Result<Vec<Vec<Carried>>, AppError> {
+        elements.iter().map(|&element| Ok(Self::carried_to(self, context, element)?)).collect()
     }
 
     as_it_is!();
@@ -168,12 +194,8 @@ impl OnElements for ImplicitVisibility {
         Ok(recorder.submit()?)
     }
 
-    fn keeps_links(&self) -> bool {
-        true
-    }
-
-    fn carried_to(&self, context: &Context, element: u32) -> Result<Vec<Carried>, AppError> {
-        Ok(Self::carried_to(self, context, element)?)
+    fn carried_to(&self, context: &Context, elements: &[u32]) -> Result<Vec<Vec<Carried>>, AppError> {
+        elements.iter().map(|&element| Ok(Self::carried_to(self, context, element)?)).collect()
     }
 
     as_it_is!();
@@ -195,10 +217,7 @@ impl OnElements for ImplicitVisibility {
         if !self.shows_view() {
             return Ok(None);
         }
-        let positions = context.download(&world.positions)?;
-        let triangles = context.download(&world.triangles)?;
-        let backs = &self.elements().topology.back_elements;
-        let picked = picked_element(self.settings().pick, &positions, &triangles, backs, view, size);
+        let picked = picked(context, world, self.elements(), self.settings().pick, view, size)?;
         let colors = self.view_colors(context, picked).map_err(AppError::failed)?;
         Ok(Some(context.upload("implicit/view colors", &colors)?))
     }
@@ -237,6 +256,18 @@ impl OnElements for Antiradiance {
         self.settings().scheme == Scheme::Asymmetric
     }
 
+    fn keep_sent(&mut self, context: &Context, keeps: bool) -> Result<(), AppError> {
+        Ok(Self::keep_sent(self, context, keeps)?)
+    }
+
+    fn carried_to(&self, context: &Context, elements: &[u32]) -> Result<Vec<Vec<Carried>>, AppError> {
+        Ok(Self::carried_to(self, context, elements)?)
+    }
+
+    fn bounces_add_up(&self) -> bool {
+        true
+    }
+
     fn false_colors(
         &self,
         context: &Context,
@@ -244,10 +275,7 @@ impl OnElements for Antiradiance {
         view: &View,
         size: UVec2,
     ) -> Result<Option<Buffer<Vec3>>, AppError> {
-        let positions = context.download(&world.positions)?;
-        let triangles = context.download(&world.triangles)?;
-        let backs = &self.elements().topology.back_elements;
-        let picked = picked_element(self.settings().pick, &positions, &triangles, backs, view, size);
+        let picked = picked(context, world, self.elements(), self.settings().pick, view, size)?;
         let colors = self.view_colors(context, picked).map_err(AppError::failed)?;
         Ok(colors.map(|colors| context.upload("antiradiance/view colors", &colors)).transpose()?)
     }

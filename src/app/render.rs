@@ -84,6 +84,8 @@ pub struct RenderRequest {
     pub profile: Option<PathBuf>,
     pub trace: Option<PathBuf>,
     pub capture: Option<PathBuf>,
+    /// The frame that is captured, counted from 1; the last where none is named.
+    pub capture_frame: Option<u32>,
     pub hashes: Option<PathBuf>,
     /// Further GPUs that make links.
     pub link_gpus: Vec<String>,
@@ -170,6 +172,13 @@ impl TryFrom<RenderArgs> for RenderRequest {
         request.profile = args.profile;
         request.trace = args.trace;
         request.capture = args.capture;
+        if let Some(frame) = args.capture_frame.filter(|frame| *frame > args.frames) {
+            let frames = args.frames;
+            return usage(format!(
+                "--capture-frame {frame}: there are {frames} frames; raise --frames or name another"
+            ));
+        }
+        request.capture_frame = args.capture_frame;
         if !args.link_gpu.is_empty() && key != "explicit-visibility" {
             return usage(format!("--link-gpu needs --method explicit-visibility; {key} makes no links by rays"));
         }
@@ -260,6 +269,7 @@ impl RenderRequest {
             profile: None,
             trace: None,
             capture: None,
+            capture_frame: None,
             hashes: None,
             link_gpus: Vec::new(),
             explain: None,
@@ -371,22 +381,23 @@ fn render(
     let watch = Watcher::new(console, interrupt);
     let mut method = time_line.span("prepare method", || frame::Method::prepare(&context, request, &stage, &watch))?;
     let mut partial = None;
-    for number in 0..request.frames {
+    for number in 1..=request.frames {
         interrupt.check()?;
-        if let (Some(capture), true) = (&mut capture, number + 1 == request.frames) {
+        let mut capture = capture.take_if(|_| number == request.capture_frame.unwrap_or(request.frames));
+        if let Some(capture) = &mut capture {
             capture.start();
         }
         let name = format!("frame {number}");
         match time_line.span(&name, || method.frame(&context, request, &stage, &film, &watch)) {
-            Err(error @ AppError::Partial(_)) => {
-                partial = Some(error);
-                break;
-            }
+            Err(error @ AppError::Partial(_)) => partial = Some(error),
             other => other?,
         }
-    }
-    if let Some(capture) = capture {
-        time_line.span("write capture", || capture.finish())?;
+        if let Some(capture) = capture {
+            time_line.span("write capture", || capture.finish())?;
+        }
+        if partial.is_some() {
+            break;
+        }
     }
     let records = context.take_records();
     let picture = time_line.span("read back", || frame::picture(&context, request, &film))?;

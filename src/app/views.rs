@@ -213,6 +213,8 @@ mod tests {
             "elements",
             "cut-size",
             "link-age",
+            "links-in",
+            "links-out",
             "bad-values",
             "depth-map",
             "traversal-order",

@@ -101,6 +101,11 @@ impl<'c> Capture<'c> {
         self.is_running = true;
     }
 
+    /// The frame came to nothing: what was captured of it is left out.
+    pub fn abandon(&mut self) {
+        self.end();
+    }
+
     /// The frame ends: the capture appears at the target, whole.
     pub fn finish(mut self) -> Result<(), CaptureError> {
         let before = self.renderdoc.get_num_captures();

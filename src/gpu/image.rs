@@ -44,6 +44,11 @@ impl Format {
         self == Self::Depth32
     }
 
+    /// Texels are unsigned integers, else floats.
+    pub(super) fn is_integer(self) -> bool {
+        self == Self::R32Uint
+    }
+
     /// Whether shaders can write it as a storage image. sRGB images are textures only; no device need store to them.
     pub(super) fn is_storable(self) -> bool {
         !matches!(self, Self::Depth32 | Self::Rgba8Srgb)
@@ -111,6 +116,7 @@ pub struct Image {
     pub layers: u32,
     pub mip_levels: u32,
     pub format: Format,
+    pub shape: Shape,
     device: Arc<Device>,
 }
 
@@ -191,6 +197,7 @@ impl Image {
                 layers: d.layers,
                 mip_levels: d.mip_levels,
                 format: d.format,
+                shape: d.shape,
                 device: device.clone(),
             };
             bound.checked("vkBindImageMemory", d.name)?;
@@ -209,6 +216,8 @@ impl Image {
         }
     }
 
+    /// # Safety
+    /// The layers and mip levels lie in the image, and fit the shape.
     unsafe fn view(
         &self,
         shape: vk::ImageViewType,
@@ -228,7 +237,7 @@ impl Image {
             .view_type(shape)
             .format(self.format.raw())
             .subresource_range(range);
-        // SAFETY: the image is alive and the range lies in it.
+        // SAFETY: the image is alive; the range lies in it, as the caller promises.
         let view =
             unsafe { self.device.raw.create_image_view(&info, None) }.checked("vkCreateImageView", &self.name)?;
         self.device.set_name(view, &self.name);
@@ -321,6 +330,8 @@ impl SamplerDescription {
 
 pub struct Sampler {
     raw: vk::Sampler,
+    /// Takes means of texels.
+    filters: bool,
     device: Arc<Device>,
 }
 
@@ -343,7 +354,12 @@ impl Sampler {
         // SAFETY: complete create info.
         let raw = unsafe { device.raw.create_sampler(&info, None) }.checked("vkCreateSampler", name)?;
         device.set_name(raw, name);
-        Ok(Self { raw, device: device.clone() })
+        let filters = d.mag_linear || d.min_linear || d.mip_linear;
+        Ok(Self { raw, filters, device: device.clone() })
+    }
+
+    pub(super) fn filters(&self) -> bool {
+        self.filters
     }
 
     pub(super) fn raw(&self) -> vk::Sampler {
@@ -400,6 +416,10 @@ impl TextureTable {
         let is_foreign = |other: &Arc<Device>| !Arc::ptr_eq(device, other);
         if images.iter().any(|i| is_foreign(&i.device)) || samplers.iter().any(|s| is_foreign(&s.device)) {
             return Err(GpuError::Refused("texture table: an image or sampler is of another device".into()));
+        }
+        if let Some(wrong) = images.iter().find(|i| i.shape != Shape::Flat || i.format.is_integer()) {
+            let Image { name, shape, format, .. } = wrong;
+            return Err(GpuError::Refused(format!("texture table: image `{name}` is {shape:?} of {format:?}")));
         }
         // SAFETY: create infos outlive their calls; written descriptors refer to live objects that the table keeps.
         unsafe {

@@ -1,7 +1,7 @@
 //! A pass: the static description of a program (made from its shader at build time) and one use of it with its
 //! buffers, parameters and constants.
 
-use super::{AccelerationStructure, Buffer, Image, Sampler, TexelBuffer, TextureTable};
+use super::{AccelerationStructure, Buffer, Format, Image, Sampler, Shape, TexelBuffer, TextureTable};
 use ash::vk;
 
 /// One program: a compute shader, or a vertex and a fragment shader. Written by the build script.
@@ -47,12 +47,17 @@ pub struct BindingInfo {
     pub writes: bool,
 }
 
+/// What a shader declares of a binding, and what an object can be bound as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ResourceKind {
     Buffer,
     TexelBuffer,
-    SampledImage,
-    StorageImage,
+    SampledImage {
+        shape: Shape,
+        /// Texels are unsigned integers, else floats.
+        is_integer: bool,
+    },
+    StorageImage(Format),
     AccelerationStructure,
 }
 
@@ -94,6 +99,7 @@ pub(super) struct Resource {
     /// Unique per object; see [`super::device::Device::new_id`].
     pub id: u64,
     pub bytes: u64,
+    pub kind: ResourceKind,
     pub handle: Handle,
 }
 
@@ -107,17 +113,18 @@ pub(super) enum Handle {
 impl<'b> Bindings<'b> {
     pub fn buffer<T>(&mut self, buffer: &'b Buffer<T>) {
         let info = vk::DescriptorBufferInfo::default().buffer(buffer.raw()).offset(0).range(vk::WHOLE_SIZE);
-        self.resources.push(Resource { id: buffer.id(), bytes: buffer.size_bytes(), handle: Handle::Buffer(info) });
+        self.raw_buffer(buffer.id(), buffer.size_bytes(), info);
     }
 
     /// A buffer known by its handle alone.
     pub(super) fn raw_buffer(&mut self, id: u64, bytes: u64, info: vk::DescriptorBufferInfo) {
-        self.resources.push(Resource { id, bytes, handle: Handle::Buffer(info) });
+        self.resources.push(Resource { id, bytes, kind: ResourceKind::Buffer, handle: Handle::Buffer(info) });
     }
 
     pub fn texel_buffer(&mut self, texels: &'b TexelBuffer) {
         let handle = Handle::TexelBuffer([texels.view()]);
-        self.resources.push(Resource { id: texels.buffer().id(), bytes: texels.size_bytes(), handle });
+        let (id, bytes) = (texels.buffer().id(), texels.size_bytes());
+        self.resources.push(Resource { id, bytes, kind: ResourceKind::TexelBuffer, handle });
     }
 
     pub fn sampled(&mut self, sampled: Sampled<'b>) {
@@ -125,12 +132,18 @@ impl<'b> Bindings<'b> {
             self.refusal
                 .get_or_insert_with(|| format!("image `{}` has a sampler of another device", sampled.image.name()));
         }
+        if sampled.sampler.filters() && sampled.image.format.is_integer() {
+            let name = sampled.image.name();
+            self.refusal.get_or_insert_with(|| format!("image `{name}` has integers, which cannot be filtered"));
+        }
         let info = vk::DescriptorImageInfo::default()
             .image_view(sampled.image.sampled_view())
             .image_layout(vk::ImageLayout::GENERAL)
             .sampler(sampled.sampler.raw());
-        let bytes = sampled.image.size_bytes();
-        self.resources.push(Resource { id: sampled.image.id(), bytes, handle: Handle::Image(info) });
+        let Image { shape, format, .. } = *sampled.image;
+        let kind = ResourceKind::SampledImage { shape, is_integer: format.is_integer() };
+        let (id, bytes) = (sampled.image.id(), sampled.image.size_bytes());
+        self.resources.push(Resource { id, bytes, kind, handle: Handle::Image(info) });
     }
 
     pub fn storage_image(&mut self, image: &'b Image) {
@@ -141,12 +154,14 @@ impl<'b> Bindings<'b> {
         }
         let info =
             vk::DescriptorImageInfo::default().image_view(image.storage_view()).image_layout(vk::ImageLayout::GENERAL);
-        self.resources.push(Resource { id: image.id(), bytes: image.size_bytes(), handle: Handle::Image(info) });
+        let (id, bytes, kind) = (image.id(), image.size_bytes(), ResourceKind::StorageImage(image.format));
+        self.resources.push(Resource { id, bytes, kind, handle: Handle::Image(info) });
     }
 
     pub fn acceleration_structure(&mut self, structure: &'b AccelerationStructure) {
         let handle = Handle::AccelerationStructure(structure.raw());
-        self.resources.push(Resource { id: structure.id(), bytes: structure.size_bytes(), handle });
+        let (id, bytes, kind) = (structure.id(), structure.size_bytes(), ResourceKind::AccelerationStructure);
+        self.resources.push(Resource { id, bytes, kind, handle });
     }
 
     pub fn textures(&mut self, table: &'b TextureTable) {
@@ -159,5 +174,23 @@ impl<'b> Bindings<'b> {
 
     pub fn constant(&mut self, id: u32, bits: u32) {
         self.constants.push((id, bits));
+    }
+
+    /// What of it does not fit the shader of `program`, if anything: number and kinds of objects, shapes and formats of
+    /// images, bytes of push constants. Sizes of buffers are the shader's business, and the device checks them.
+    pub(super) fn misfit(&self, program: &Program) -> Option<String> {
+        let (given, wanted) = (self.resources.len(), program.bindings.len());
+        if given != wanted {
+            return Some(format!("{given} objects are bound, its shader declares {wanted}"));
+        }
+        let mut pairs = self.resources.iter().zip(program.bindings);
+        if let Some((resource, info)) = pairs.find(|(resource, info)| resource.kind != info.kind) {
+            return Some(format!("`{}` is {:?}, what is bound to it {:?}", info.name, info.kind, resource.kind));
+        }
+        if self.push_constants.len() != program.push_constant_bytes as usize {
+            let (given, wanted) = (self.push_constants.len(), program.push_constant_bytes);
+            return Some(format!("{given} bytes of push constants, its shader declares {wanted}"));
+        }
+        (program.uses_textures && self.textures.is_none()).then(|| "the texture table is not bound".to_owned())
     }
 }

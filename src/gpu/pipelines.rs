@@ -426,8 +426,8 @@ pub(super) fn descriptor_type(kind: ResourceKind) -> vk::DescriptorType {
     match kind {
         ResourceKind::Buffer => vk::DescriptorType::STORAGE_BUFFER,
         ResourceKind::TexelBuffer => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
-        ResourceKind::SampledImage => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-        ResourceKind::StorageImage => vk::DescriptorType::STORAGE_IMAGE,
+        ResourceKind::SampledImage { .. } => vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+        ResourceKind::StorageImage(_) => vk::DescriptorType::STORAGE_IMAGE,
         ResourceKind::AccelerationStructure => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
     }
 }

@@ -199,6 +199,11 @@ impl<'c> Recorder<'c> {
             target.color.iter().map(|(image, _)| Access { id: image.id(), reads: true, writes: true }).collect();
         attachments.extend(target.depth.iter().map(|(image, ..)| Access { id: image.id(), reads: true, writes: true }));
         let (width, height) = match target.extent() {
+            // What is drawn into cannot be read by the same draw.
+            Ok(_) if bindings.resources.iter().any(|bound| attachments.iter().any(|a| a.id == bound.id)) => {
+                let message = format!("{}: an image that is drawn into is bound too", P::PROGRAM.name);
+                return self.fail(GpuError::Refused(message));
+            }
             Ok(extent) => extent,
             Err(wrong) => return self.fail(GpuError::Refused(format!("{}: {wrong}", P::PROGRAM.name))),
         };
@@ -309,7 +314,8 @@ impl<'c> Recorder<'c> {
         }
         let is_foreign = bindings.textures.is_some_and(|table| !table.is_of(&self.context.device));
         let foreign = is_foreign.then(|| "its textures are of another device".to_owned());
-        if let Some(refusal) = bindings.refusal.clone().or(foreign) {
+        let refusal = bindings.refusal.clone().or(foreign).or_else(|| bindings.misfit(program));
+        if let Some(refusal) = refusal {
             return self.fail(GpuError::Refused(format!("{}: {refusal}", program.name)));
         }
         let mut accesses: Vec<Access> = program

@@ -33,12 +33,22 @@ pub enum BindingKind {
     Buffer(Layout),
     /// `usamplerBuffer`: texels of four words.
     TexelBuffer,
-    /// `sampler2D`, `samplerCubeArrayShadow` ...: one image with its sampler.
-    SampledImage,
+    /// `sampler2D`, `usampler2DArray` ...: one image with its sampler.
+    SampledImage(ImageShape),
     /// The unbounded `sampler2D textures[]` of the scene.
     TextureTable,
-    StorageImage,
+    /// `image2D` of this format, by its name in Rust.
+    StorageImage(&'static str),
     AccelerationStructure,
+}
+
+/// How a shader sees a sampled image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ImageShape {
+    /// Its layers, by their name in Rust.
+    pub shape: &'static str,
+    /// Texels are unsigned integers, else floats.
+    pub is_integer: bool,
 }
 
 /// A specialisation constant.
@@ -140,16 +150,50 @@ fn binding(
             let (own_name, element) = block_element(ty)?;
             (access(a), BindingKind::Buffer(element), Some(own_name))
         }
-        DescriptorType::CombinedImageSampler() if count == 1 => ((true, false), BindingKind::SampledImage, None),
+        DescriptorType::CombinedImageSampler() if count == 1 => {
+            ((true, false), BindingKind::SampledImage(sampled_shape(ty)?), None)
+        }
         DescriptorType::CombinedImageSampler() => ((true, false), BindingKind::TextureTable, None),
         DescriptorType::UniformTexelBuffer() => ((true, false), BindingKind::TexelBuffer, None),
-        DescriptorType::StorageImage(a) => (access(a), BindingKind::StorageImage, None),
+        DescriptorType::StorageImage(a) => (access(a), BindingKind::StorageImage(storage_format(ty)?), None),
         DescriptorType::AccelStruct() => ((true, false), BindingKind::AccelerationStructure, None),
         other => return Err(format!("binding {set}.{binding}: {other:?} is not used in this project")),
     };
     let name = own_name.or(name.map(str::to_owned));
     let name = name.filter(|n| !n.is_empty()).ok_or_else(|| format!("binding {set}.{binding} has no name"))?;
     Ok(Binding { set, binding, name, kind, reads, writes })
+}
+
+fn sampled_shape(ty: &Type) -> Result<ImageShape, String> {
+    let Type::CombinedImageSampler(sampled) = ty else { return Err(format!("{ty} is no image with a sampler")) };
+    let image = &sampled.sampled_image_ty;
+    let shape = match (image.dim, image.is_array) {
+        _ if image.is_multisampled => return Err(format!("{ty}: images have one sample a pixel here")),
+        (spirv::Dim::Dim2D, false) => "Flat",
+        (spirv::Dim::Dim2D, true) => "Array",
+        (spirv::Dim::DimCube, true) => "CubeArray",
+        _ => return Err(format!("{ty}: no image of ours has this shape")),
+    };
+    match image.scalar_ty {
+        ScalarType::Float { bits: 32 } => Ok(ImageShape { shape, is_integer: false }),
+        ScalarType::Integer { bits: 32, is_signed: false } => Ok(ImageShape { shape, is_integer: true }),
+        _ => Err(format!("{ty}: no image of ours has such texels")),
+    }
+}
+
+fn storage_format(ty: &Type) -> Result<&'static str, String> {
+    let Type::StorageImage(image) = ty else { return Err(format!("{ty} is no storage image")) };
+    if image.dim != spirv::Dim::Dim2D || image.is_array || image.is_multisampled {
+        return Err(format!("{ty}: storage images are flat here"));
+    }
+    match image.fmt {
+        spirv::ImageFormat::Rgba8 => Ok("Rgba8"),
+        spirv::ImageFormat::Rgba16f => Ok("Rgba16Float"),
+        spirv::ImageFormat::Rgba32f => Ok("Rgba32Float"),
+        spirv::ImageFormat::R32f => Ok("R32Float"),
+        spirv::ImageFormat::R32ui => Ok("R32Uint"),
+        _ => Err(format!("{ty}: no image of ours has this format; declare one of crate::gpu::Format")),
+    }
 }
 
 /// A buffer block holds one member, `T items[]` or `T item`: its name and element type.

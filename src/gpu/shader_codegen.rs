@@ -4,7 +4,7 @@
 //! A `.vert` and a `.frag` of one stem make one raster pass. A struct that several shaders use becomes one Rust type;
 //! two that differ under one name are an error.
 
-use crate::reflection::{self, Binding, BindingKind, Constant, Interface, Layout, Struct};
+use crate::reflection::{self, Binding, BindingKind, Constant, ImageShape, Interface, Layout, Struct};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -153,19 +153,26 @@ fn pass_text(name: &str, pass: &PassShaders, types: &mut BTreeMap<String, Struct
         let (field_type, call, kind_name) = match kind {
             BindingKind::Buffer(layout) => {
                 collect_types(layout, types)?;
-                (format!("&'a crate::gpu::Buffer<{}>", rust_type(layout)), "buffer", "Buffer")
+                (format!("&'a crate::gpu::Buffer<{}>", rust_type(layout)), "buffer", "Buffer".to_owned())
             }
-            BindingKind::TexelBuffer => ("&'a crate::gpu::TexelBuffer".into(), "texel_buffer", "TexelBuffer"),
-            BindingKind::SampledImage => ("crate::gpu::Sampled<'a>".into(), "sampled", "SampledImage"),
+            BindingKind::TexelBuffer => ("&'a crate::gpu::TexelBuffer".into(), "texel_buffer", "TexelBuffer".into()),
+            BindingKind::SampledImage(ImageShape { shape, is_integer }) => {
+                let kind = format!("SampledImage {{ shape: crate::gpu::Shape::{shape}, is_integer: {is_integer} }}");
+                ("crate::gpu::Sampled<'a>".into(), "sampled", kind)
+            }
             BindingKind::TextureTable => {
                 if binding.set != 1 {
                     return Err(format!("the texture table `{name}` must be set = 1"));
                 }
-                ("&'a crate::gpu::TextureTable".into(), "textures", "")
+                ("&'a crate::gpu::TextureTable".into(), "textures", String::new())
             }
-            BindingKind::StorageImage => ("&'a crate::gpu::Image".into(), "storage_image", "StorageImage"),
+            BindingKind::StorageImage(format) => {
+                let kind = format!("StorageImage(crate::gpu::Format::{format})");
+                ("&'a crate::gpu::Image".into(), "storage_image", kind)
+            }
             BindingKind::AccelerationStructure => {
-                ("&'a crate::gpu::AccelerationStructure".into(), "acceleration_structure", "AccelerationStructure")
+                let kind = "AccelerationStructure".to_owned();
+                ("&'a crate::gpu::AccelerationStructure".into(), "acceleration_structure", kind)
             }
         };
         if *kind != BindingKind::TextureTable && binding.set != 0 {

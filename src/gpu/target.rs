@@ -31,6 +31,11 @@ impl Target<'_> {
                 (other.width, other.height)
             ));
         }
+        let mut ids: Vec<u64> = self.color.iter().map(|(image, _)| image.id()).collect();
+        ids.sort_unstable();
+        if ids.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Err("an image is drawn into twice at once".into());
+        }
         if let Some((image, _)) = self.color.iter().find(|(image, _)| image.format.is_depth()) {
             return Err(format!("`{}` is a depth image, drawn into as colour", image.name()));
         }

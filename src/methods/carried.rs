@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Where light came from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Sender {
     Element(u32),
     /// A node over several elements, `leaf_count` of them, the first being `first`.
@@ -16,6 +16,8 @@ pub enum Sender {
     Neighbours,
     /// Tables of directions of glossy senders, all together.
     Glossy,
+    /// What was taken away below the least that may arrive, and is given back.
+    Floor,
 }
 
 /// One link and what came along it.

@@ -81,18 +81,32 @@ pub struct LinkSet<W> {
     pub windows: Vec<LinkWindow<W>>,
     /// Radiosity of each sender, a word as long as a link.
     pub sent: Buffer<W>,
+    /// Of links that were here before.
+    spare: Vec<Buffer<W>>,
 }
 
 impl<W> LinkSet<W> {
     fn new(context: &Context, sender_count: u32) -> Result<Self, GpuError> {
-        Ok(Self { windows: Vec::new(), sent: context.buffer("links/sent", sender_count as usize)? })
+        let sent = context.buffer("links/sent", sender_count as usize)?;
+        Ok(Self { windows: Vec::new(), sent, spare: Vec::new() })
     }
 
     fn size_bytes(&self) -> u64 {
-        self.sent.size_bytes() + self.windows.iter().map(|w| w.words.size_bytes()).sum::<u64>()
+        let windows = self.windows.iter().map(|window| &window.words).chain(&self.spare);
+        self.sent.size_bytes() + windows.map(Buffer::size_bytes).sum::<u64>()
     }
 
-    /// The last window, or a new one of `capacity` links where that has no room for `count` more.
+    fn clear(&mut self) {
+        self.windows.clear();
+        self.spare.clear();
+    }
+
+    /// All links go, their memory stays for others.
+    fn empty(&mut self) {
+        self.spare.extend(self.windows.drain(..).map(|window| window.words));
+    }
+
+    /// The last window, or another where that has no room for `count` more: a spare one, else a new one of `capacity` links.
     fn window_for(
         &mut self,
         context: &Context,
@@ -103,7 +117,14 @@ impl<W> LinkSet<W> {
         let room = self.windows.last().map(|w| w.words.len() - w.link_count as usize);
         if room.is_none_or(|room| room < count as usize) {
             let first_link = self.windows.last().map_or(0, |w| w.first_link + w.link_count);
-            let words = context.buffer(&format!("links/window {}", self.windows.len()), capacity()?)?;
+            let words = match self.spare.iter().position(|words| words.len() >= count as usize) {
+                Some(place) => self.spare.remove(place),
+                None => {
+                    // What does not even hold a batch is of no use.
+                    self.spare.clear();
+                    context.buffer(&format!("links/window {}", self.windows.len()), capacity()?)?
+                }
+            };
             self.windows.push(LinkWindow { first_element, element_count: 0, first_link, link_count: 0, words });
         }
         let last = self.windows.len() - 1;
@@ -146,11 +167,33 @@ impl Links {
         }
     }
 
+    /// No links, and room for none.
+    fn new(context: &Context, format: LinkFormat, counts: LinkCounts) -> Result<Self, GpuError> {
+        Ok(Self {
+            offsets: context.upload("links/offsets", &vec![0; counts.receivers as usize + 1])?,
+            words: match format {
+                LinkFormat::Full => LinkWords::Full(LinkSet::new(context, counts.senders)?),
+                LinkFormat::Packed => LinkWords::Packed(LinkSet::new(context, counts.senders)?),
+            },
+            element_count: counts.receivers,
+            link_count: 0,
+        })
+    }
+
     /// Gives the windows' memory back.
     pub fn clear(&mut self) {
         match &mut self.words {
-            LinkWords::Full(set) => set.windows.clear(),
-            LinkWords::Packed(set) => set.windows.clear(),
+            LinkWords::Full(set) => set.clear(),
+            LinkWords::Packed(set) => set.clear(),
+        }
+        self.link_count = 0;
+    }
+
+    /// All links go; the windows' memory stays for those to come.
+    fn empty(&mut self) {
+        match &mut self.words {
+            LinkWords::Full(set) => set.empty(),
+            LinkWords::Packed(set) => set.empty(),
         }
         self.link_count = 0;
     }
@@ -206,14 +249,10 @@ pub struct LinkCounts {
     pub batch: u32,
 }
 
-/// Builds [`Links`] from batches of hits, in order of receivers: [`Self::merge`], submit, [`Self::append`].
-pub struct LinkBuilder<'c> {
-    context: &'c Context,
-    unfinished: UnfinishedLinks,
-}
-
-/// What a [`LinkBuilder`] has built so far, to be gone on with later ([`LinkBuilder::resume`]).
-pub struct UnfinishedLinks {
+/// Builds [`Links`] from batches of hits, in order of receivers: [`Self::merge`], submit, [`Self::append`]. What was built is
+/// handed over at the end ([`Self::finish`]), or in exchange for old links whose memory is used again
+/// ([`Self::swap`]).
+pub struct LinkBuilder {
     counts: LinkCounts,
     budget: u64,
     /// A row of `3 * rays` for each receiver of a batch.
@@ -222,46 +261,60 @@ pub struct UnfinishedLinks {
     row_counts: Buffer<u32>,
     scan: ScanScratch,
     links: Links,
+    /// Not the first links: those to come may be more, by as much as surfaces move.
+    is_again: bool,
 }
 
-impl<'c> LinkBuilder<'c> {
+impl LinkBuilder {
     /// Scratch bytes per receiver of a batch.
     pub fn batch_bytes(ray_count: u32) -> u64 {
         u64::from(3 * ray_count) * size_of::<RowEntry>() as u64
     }
 
     /// `budget`: bytes that links may take.
-    pub fn new(context: &'c Context, format: LinkFormat, counts: LinkCounts, budget: u64) -> Result<Self, LinkError> {
+    pub fn new(context: &Context, format: LinkFormat, counts: LinkCounts, budget: u64) -> Result<Self, LinkError> {
         if format == LinkFormat::Packed && counts.senders > PACKED_ELEMENTS {
             return Err(LinkError::TooManyForPacked(counts.senders));
         }
         let rows = counts.batch as usize;
-        let unfinished = UnfinishedLinks {
+        Ok(Self {
             counts,
             budget,
             row_entries: context.buffer("links/row entries", rows * 3 * counts.rays as usize)?,
             row_counts: context.buffer("links/row counts", rows + 1)?,
             scan: ScanScratch::new(context, "links", rows + 1)?,
-            links: Links {
-                offsets: context.upload("links/offsets", &vec![0; counts.receivers as usize + 1])?,
-                words: match format {
-                    LinkFormat::Full => LinkWords::Full(LinkSet::new(context, counts.senders)?),
-                    LinkFormat::Packed => LinkWords::Packed(LinkSet::new(context, counts.senders)?),
-                },
-                element_count: counts.receivers,
-                link_count: 0,
-            },
+            links: Links::new(context, format, counts)?,
+            is_again: false,
+        })
+    }
+
+    /// Hands the links over in place of `links`, whose memory the next ones are built in.
+    pub fn swap(&mut self, links: &mut Links) {
+        std::mem::swap(&mut self.links, links);
+        self.is_again = true;
+        self.links.empty();
+    }
+
+    /// As [`Self::swap`], where there are no links yet.
+    pub fn take(&mut self, context: &Context) -> Result<Links, GpuError> {
+        let format = match &self.links.words {
+            LinkWords::Full(_) => LinkFormat::Full,
+            LinkWords::Packed(_) => LinkFormat::Packed,
         };
-        Ok(Self { context, unfinished })
+        let mut links = Links::new(context, format, self.counts)?;
+        std::mem::swap(&mut self.links, &mut links);
+        Ok(links)
     }
 
-    /// Goes on where [`Self::pause`] stopped.
-    pub fn resume(context: &'c Context, unfinished: UnfinishedLinks) -> Self {
-        Self { context, unfinished }
+    /// Leaves out what was built so far; its memory stays.
+    pub fn start_over(&mut self) {
+        self.links.empty();
     }
 
-    pub fn pause(self) -> UnfinishedLinks {
-        self.unfinished
+    /// Leaves out what was built so far, and gives its memory back.
+    pub fn clear(&mut self) {
+        self.links.clear();
+        self.is_again = false;
     }
 
     /// Turns the hits of the receivers of `batch` into rows.
@@ -274,7 +327,7 @@ impl<'c> LinkBuilder<'c> {
         back_elements: &Buffer<u32>,
         outcomes: &Outcomes,
     ) {
-        let UnfinishedLinks { counts, row_entries, row_counts, scan, .. } = &self.unfinished;
+        let Self { counts, row_entries, row_counts, scan, .. } = self;
         let batch_count = batch.len() as u32;
         let pass = passes::MergeHits {
             hits,
@@ -297,9 +350,8 @@ impl<'c> LinkBuilder<'c> {
     }
 
     /// Adds the rows of a merged batch to the list, in a new window where the last one has no room.
-    pub fn append(&mut self, batch: Range<u32>) -> Result<(), LinkError> {
-        let context = self.context;
-        let UnfinishedLinks { counts, budget, row_entries, row_counts, links, .. } = &mut self.unfinished;
+    pub fn append(&mut self, context: &Context, batch: Range<u32>) -> Result<(), LinkError> {
+        let Self { counts, budget, row_entries, row_counts, links, is_again, .. } = self;
         let batch_count = batch.len() as u32;
         let total = context.download_range(row_counts, batch.len()..batch.len() + 1)?[0];
         let link_count = u64::from(links.link_count) + u64::from(total);
@@ -309,7 +361,8 @@ impl<'c> LinkBuilder<'c> {
         let (link_base, row_capacity) = (links.link_count, 3 * counts.rays);
         let capacity = |link_bytes| {
             let budget = budget.saturating_sub(held).min(context.available_bytes());
-            window_capacity(context, counts, &batch, total, link_base, link_bytes, (held, budget))
+            let wanted = window_capacity(context, counts, &batch, total, link_base, link_bytes, (held, budget))?;
+            Ok(if *is_again { with_room(context, wanted, link_bytes, budget) } else { wanted })
         };
         let mut recorder = context.recorder("links")?;
         match &mut links.words {
@@ -360,9 +413,8 @@ impl<'c> LinkBuilder<'c> {
     }
 
     /// Adds rows made elsewhere to the list.
-    pub fn append_rows(&mut self, receivers: Range<u32>, rows: &Rows) -> Result<(), LinkError> {
-        let context = self.context;
-        let UnfinishedLinks { counts, budget, links, .. } = &mut self.unfinished;
+    pub fn append_rows(&mut self, context: &Context, receivers: Range<u32>, rows: &Rows) -> Result<(), LinkError> {
+        let Self { counts, budget, links, .. } = self;
         let total = rows.offsets.last().copied().unwrap_or(0);
         let link_count = u64::from(links.link_count) + u64::from(total);
         let after = u32::try_from(link_count).map_err(|_| LinkError::TooMany(link_count))?;
@@ -406,10 +458,21 @@ impl<'c> LinkBuilder<'c> {
         Ok(())
     }
 
+    /// Those of the batches appended so far.
+    pub fn links(&self) -> &Links {
+        &self.links
+    }
+
     /// The links of all batches appended.
     pub fn finish(self) -> Links {
-        self.unfinished.links
+        self.links
     }
+}
+
+/// A window that holds a quarter more than `wanted` links, as far as that is allowed.
+fn with_room(context: &Context, wanted: usize, link_bytes: u64, available: u64) -> usize {
+    let most = (context.limits().storage_buffer_bytes.min(available) / link_bytes) as usize;
+    (wanted + wanted / 4).min(most).max(wanted)
 }
 
 /// Links that a new window should hold: for all the rest of the rows, judged by this batch, and in any case for the

@@ -4,8 +4,9 @@ use crate::common::TestContext;
 use crate::fixture::{Fixture, builtin_scene, solve};
 use glam::Vec3;
 use linklight::gpu::Options;
-use linklight::methods::explicit_visibility::{ExplicitVisibility, Helper, RayCount, Settings};
+use linklight::methods::explicit_visibility::{ExplicitVisibility, Helper, RayCount, Settings, Shown};
 use linklight::scene::pose::Pose;
+use linklight::stages::false_color::{self, NEUTRAL, PICKED};
 
 fn few_rays() -> Settings {
     Settings { rays_per_element: RayCount::new(64).unwrap(), ..Settings::default() }
@@ -68,23 +69,72 @@ fn links_within_a_budget_come_to_what_links_at_once_are_and_tell_their_age() {
     let (youngest, oldest) = (told.iter().min().unwrap(), told.iter().max().unwrap());
     assert_eq!((*youngest, *oldest, told.len()), (2, 5, elements as usize));
     assert!(spread.is_stale());
+
+    // Two sets of links take turns: once both are there nothing is allocated any more, and nothing grows.
+    let mut held = Vec::new();
+    for frame in 0..24u8 {
+        pose(&context, &fixture, 0.9 + 0.1 * f32::from(frame % 3));
+        spread.follow_within(&context, &fixture.stage(), quarter, true).unwrap();
+        let bytes: u64 = context.memory_by_owner().values().map(|memory| memory.current_bytes).sum();
+        held.push((context.allocation_count(), bytes));
+    }
+    assert!(held[11..].iter().all(|now| *now == held[11]), "allocations and bytes by frame: {held:?}");
+}
+
+#[test]
+fn views_show_the_links_of_the_picked_element_both_ways() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.5));
+    let light = fixture.prepare(&context, few_rays());
+    assert_eq!(light.view_colors(&context, Some(0)).unwrap(), None);
+    let (links, offsets) =
+        (light.links().download(&context).unwrap(), context.download(&light.links().offsets).unwrap());
+    let row = |element: usize| &links[offsets[element] as usize..offsets[element + 1] as usize];
+    let count = light.elements().count as usize;
+    let picked = (0..count).max_by_key(|&element| row(element).len()).unwrap();
+    let strongest = row(picked).iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).unwrap();
+    for (show, linked) in [
+        (Shown::LinksIn, row(picked).iter().map(|link| link.sender as usize).collect::<Vec<_>>()),
+        (Shown::LinksOut, (0..count).filter(|&e| row(e).iter().any(|link| link.sender == picked as u32)).collect()),
+    ] {
+        let method = fixture.prepare(&context, Settings { show, ..few_rays() });
+        let colors = method.view_colors(&context, Some(picked as u32)).unwrap().unwrap();
+        let is_colored = |element: &usize| colors[*element] != NEUTRAL && *element != picked;
+        assert!(!linked.is_empty() && (0..count).filter(is_colored).eq(linked.iter().copied()), "{show:?}");
+        assert_eq!(colors[picked], PICKED);
+        if show == Shown::LinksIn {
+            assert_eq!(colors[strongest.sender as usize], false_color::of_amount(1.0));
+        }
+        // Nothing picked, or nothing that is there: nothing to show.
+        for nothing in [None, Some(u32::MAX)] {
+            assert!(method.view_colors(&context, nothing).unwrap().unwrap().iter().all(|color| *color == NEUTRAL));
+        }
+    }
 }
 
 #[test]
 fn two_devices_make_the_links_of_one_to_the_bit() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.3));
+    let fixture = Fixture::new(&context, builtin_scene("dancer"), None);
     for packed_links in [false, true] {
         let settings = Settings { packed_links, ..few_rays() };
-        let alone = fixture.prepare(&context, settings);
+        pose(&context, &fixture, 0.0);
+        let mut alone = fixture.prepare(&context, settings);
         let options = Options { validation: true, ..Options::default() };
-        let helper = Helper::new(options, &fixture.stage(), &Pose::rest(&fixture.scene), settings).unwrap();
-        let helpers = [helper];
-        let together = ExplicitVisibility::prepare_over(&context, &fixture.stage(), settings, &helpers).unwrap();
+        let helper = Helper::new(options, &fixture.stage(), &Pose::at(&fixture.scene, 0.0), settings).unwrap();
+        let stage = fixture.stage();
+        let mut together = ExplicitVisibility::prepare_over(&context, &stage, settings, vec![helper]).unwrap();
         assert!(state(&context, &alone) == state(&context, &together), "packed {packed_links}");
         let shares = &together.report().device_elements;
         assert!(shares.len() == 2 && shares.iter().all(|&share| share > 0), "both took part: {shares:?}");
         assert_eq!(shares.iter().sum::<u32>(), alone.elements().count);
-        assert_eq!(helpers[0].validation_messages(), [""; 0]);
+        // Both follow what moves: the same scene turned into another by its own pose.
+        let before = state(&context, &alone);
+        pose(&context, &fixture, 0.7);
+        alone.follow(&context, &fixture.stage()).unwrap();
+        together.follow(&context, &fixture.stage()).unwrap();
+        assert!(state(&context, &alone) == state(&context, &together) && state(&context, &alone) != before);
+        assert_eq!(together.report().device_elements.len(), 2);
+        assert_eq!(together.helpers()[0].validation_messages(), [""; 0]);
     }
 }

@@ -73,7 +73,7 @@ fn build(
         let mut recorder = context.recorder("test").unwrap();
         builder.merge(&mut recorder, range.clone(), &hits, &triangles, &back_elements, &outcomes);
         recorder.submit().unwrap();
-        builder.append(range).unwrap();
+        builder.append(context, range).unwrap();
     }
     (builder.finish(), outcomes)
 }
@@ -176,7 +176,7 @@ fn what_does_not_fit_is_refused_with_figures() {
     let mut recorder = context.recorder("test").unwrap();
     builder.merge(&mut recorder, 0..32, &hits, &triangles, &back_elements, &outcomes);
     recorder.submit().unwrap();
-    match builder.append(0..32) {
+    match builder.append(&context, 0..32) {
         Err(error @ LinkError::OutOfMemory { needed, available, counted: 32, element_count: 64, .. }) => {
             assert!(needed > available && available == 20_000, "{needed} of {available}");
             assert!(error.to_string().contains("rays_per_element"), "{error}");

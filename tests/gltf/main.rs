@@ -4,6 +4,7 @@ mod bad;
 mod conformance;
 mod features;
 mod mutated;
+mod rules;
 mod shared_bad;
 mod sound;
 mod support;

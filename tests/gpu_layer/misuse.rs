@@ -5,8 +5,10 @@ use crate::common::TestContext;
 use glam::{UVec3, Vec3};
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
 use linklight::gpu::{
-    Buffer, Context, Format, GpuError, Image, ImageDescription, SamplerDescription, Shape, TexelBuffer,
+    Bindings, Buffer, Context, Format, GpuError, Image, ImageDescription, Load, Pass, Program, RasterState, Sampled,
+    SamplerDescription, Shape, Target, TexelBuffer,
 };
+use std::marker::PhantomData;
 
 fn image(context: &Context, width: u32, format: Format) -> Image {
     let description =
@@ -133,4 +135,99 @@ fn counts_beyond_a_buffer_touch_nothing_else() {
     assert_eq!(context.download(&values).unwrap(), [3; 100], "what is there is done");
     assert!(context.download(&before).unwrap().iter().all(|value| *value == 5));
     assert!(context.download(&after).unwrap().iter().all(|value| *value == 6));
+}
+
+/// A pass written by hand: the program of a generated one, with anything bound to it.
+struct ByHand<'a, P> {
+    buffers: Vec<&'a Buffer<u32>>,
+    storage: Option<&'a Image>,
+    sampled: Option<Sampled<'a>>,
+    push_constants: Vec<u8>,
+    program: PhantomData<P>,
+}
+
+impl<P> Default for ByHand<'_, P> {
+    fn default() -> Self {
+        Self { buffers: Vec::new(), storage: None, sampled: None, push_constants: Vec::new(), program: PhantomData }
+    }
+}
+
+impl<P: Pass> Pass for ByHand<'_, P> {
+    const PROGRAM: &'static Program = P::PROGRAM;
+    fn bind<'b>(&'b self, bindings: &mut Bindings<'b>) {
+        self.buffers.iter().for_each(|buffer| bindings.buffer(*buffer));
+        self.storage.into_iter().for_each(|image| bindings.storage_image(image));
+        self.sampled.into_iter().for_each(|sampled| bindings.sampled(sampled));
+        bindings.push_constants(&self.push_constants);
+    }
+}
+
+/// What is bound is what the shader declares: as many objects, of those kinds, images of that shape and format.
+#[test]
+fn what_does_not_fit_the_shader_is_refused() {
+    type Add = AddBlockSums<'static>;
+    type Interface = linklight::gpu::shaders::display::Interface<'static>;
+    let context = TestContext::new();
+    let values = context.upload("test/values", &[1u32; 64]).unwrap();
+    let color = image(&context, 4, Format::Rgba8);
+    let dispatched = |record: &dyn Fn(&mut linklight::gpu::Recorder<'_>)| {
+        let mut recorder = context.recorder("test").unwrap();
+        record(&mut recorder);
+        recorder.submit()
+    };
+    let whole = || ByHand::<Add> { buffers: vec![&values; 2], push_constants: vec![0; 4], ..ByHand::default() };
+    dispatched(&|r| r.dispatch(&whole(), 1u32)).unwrap();
+    let few = ByHand::<Add> { buffers: vec![&values], ..whole() };
+    refused(dispatched(&|r| r.dispatch(&few, 1u32)), &["1 objects", "declares 2"]);
+    let other = ByHand::<Add> { buffers: vec![&values], storage: Some(&color), ..whole() };
+    refused(dispatched(&|r| r.dispatch(&other, 1u32)), &["`block_sums` is Buffer", "StorageImage(Rgba8)"]);
+    let short = ByHand::<Add> { push_constants: vec![0; 3], ..whole() };
+    refused(dispatched(&|r| r.dispatch(&short, 1u32)), &["3 bytes of push constants", "declares 4"]);
+
+    // A picture of another format than the kernel stores, and of another shape or kind than it samples.
+    let float = image(&context, 4, Format::Rgba32Float);
+    type Tone = linklight::gpu::shaders::tone_map::Apply<'static>;
+    let frame = |storage| ByHand::<Tone> {
+        buffers: vec![&values; 3],
+        storage: Some(storage),
+        push_constants: vec![0; Tone::PROGRAM.push_constant_bytes as usize],
+        ..ByHand::default()
+    };
+    dispatched(&|r| r.dispatch(&frame(&color), 0u32)).unwrap();
+    refused(dispatched(&|r| r.dispatch(&frame(&float), 1u32)), &["`frame`", "Rgba8", "Rgba32Float"]);
+    let layered = |shape, layers, format| {
+        let description =
+            ImageDescription { name: "test/layers", width: 4, height: 4, layers, mip_levels: 1, format, shape };
+        context.image(&description).unwrap()
+    };
+    let sampler = context.sampler("test/sampler", SamplerDescription::LINEAR_CLAMP).unwrap();
+    let nearest = context.sampler("test/sampler", SamplerDescription::NEAREST_CLAMP).unwrap();
+    for (image, sampler, told) in [
+        (layered(Shape::Array, 2, Format::Rgba8), &sampler, "shape: Array"),
+        (layered(Shape::CubeArray, 6, Format::Rgba8), &sampler, "shape: CubeArray"),
+        (layered(Shape::Flat, 1, Format::R32Uint), &nearest, "is_integer: true"),
+        (layered(Shape::Flat, 1, Format::R32Uint), &sampler, "cannot be filtered"),
+    ] {
+        let glyphs = ByHand::<Interface> {
+            buffers: vec![&values; 3],
+            sampled: Some(Sampled { image: &image, sampler }),
+            push_constants: vec![0; Interface::PROGRAM.push_constant_bytes as usize],
+            ..ByHand::default()
+        };
+        let target = Target { color: vec![(&color, Load::Keep)], depth: None };
+        refused(dispatched(&|r| r.draw(&glyphs, &target, RasterState::default(), 3, 1)), &[told]);
+        let table = context.texture_table(vec![image], vec![], &[]);
+        refused(table, &["test/layers"]);
+    }
+    // What is drawn into is not read by the same draw, and not drawn into twice.
+    let own = ByHand::<Interface> {
+        buffers: vec![&values; 3],
+        sampled: Some(Sampled { image: &color, sampler: &sampler }),
+        push_constants: vec![0; Interface::PROGRAM.push_constant_bytes as usize],
+        ..ByHand::default()
+    };
+    let once = Target { color: vec![(&color, Load::Keep)], depth: None };
+    refused(dispatched(&|r| r.draw(&own, &once, RasterState::default(), 3, 1)), &["drawn into is bound"]);
+    let twice = Target { color: vec![(&color, Load::Keep); 2], depth: None };
+    refused(dispatched(&|r| r.draw(&own, &twice, RasterState::default(), 3, 1)), &["twice"]);
 }

@@ -34,6 +34,7 @@ use super::compare::plan::{Plan, REFERENCE};
 use super::console::{Console, Watcher};
 use super::frame::Method;
 use super::interrupt::Interrupt;
+use super::output::Measured;
 use super::render::{self, LightParts, RenderRequest};
 use super::stage::Stage;
 use super::{AppError, measure, output};
@@ -76,9 +77,12 @@ pub fn run(
     let form = args.into.unwrap_or(default);
     let exr = args.output.with_extension("exr");
     check_writable(&args.output)?;
+    [&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| check_writable(path))?;
     let plan = Plan { methods: vec![args.method], variations: &[], set: &args.set, options: &args.options, global };
     plan.check()?;
-    let bake = Bake { args, form, run: plan.run(&args.scene, args.method, &[], &exr)?.request };
+    let request = plan.run(&args.scene, args.method, &[], &exr)?.request;
+    let run = RenderRequest { profile: args.profile.clone(), trace: args.trace.clone(), ..request };
+    let bake = Bake { args, form, run };
     bake.run(global, console, interrupt, &exr, out)
 }
 
@@ -98,12 +102,13 @@ impl Bake<'_> {
         out: &mut dyn Write,
     ) -> Result<(), AppError> {
         let request = &self.run;
-        let context = render::open_device(global, false)?;
+        let time_line = TimeLine::default();
+        let context = time_line.span("open device", || render::open_device(global, request.profile.is_some()))?;
         let watch = Watcher::new(console, interrupt);
-        let stage = Stage::new(&context, request, &TimeLine::default())?;
+        let stage = Stage::new(&context, request, &time_line)?;
         let vertices = deform::world_vertices(&stage.geometry, &stage.pose);
-        let mut method = Method::prepare(&context, request, &stage, &watch)?;
-        let solved = method.solve(&context, request, &stage, &watch)?;
+        let mut method = time_line.span("prepare method", || Method::prepare(&context, request, &stage, &watch))?;
+        let solved = time_line.span("solve", || method.solve(&context, request, &stage, &watch))?;
         let (light, own_texels) = ElementLight::of(&context, request, &stage, &solved)?;
 
         let texels = match self.form {
@@ -147,6 +152,10 @@ impl Bake<'_> {
         }
         write_bytes(&self.args.output, &glb)?;
         written.push(self.args.output.clone());
+        let records = context.take_records();
+        let (scene, facts) = (stage.facts(), method.report()?);
+        let measured = Measured { context: &context, time_line: &time_line, records, scene, method: facts };
+        output::write_measurements(request, measured, &mut std::io::sink())?;
         self.report(&stage, &pieces, scale, &written, out)
     }
 

@@ -1,6 +1,6 @@
 //! Pixels of methods whose light is on elements, shown between vertices or by flat patches.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::{DVec3, UVec2, Vec3};
 
@@ -8,13 +8,14 @@ use super::probe::{Probe, Seen};
 use super::{Frame, Parts, add};
 use crate::app::AppError;
 use crate::app::frame::{VertexShown, explicit_stage};
+use crate::app::on_elements::OnElements;
 use crate::app::stage::Stage;
 use crate::display::direct::Canvas;
 use crate::display::splat::{self, SplatLight};
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Buffer;
 use crate::gpu::shaders::types::Splat;
-use crate::methods::carried::Sender;
+use crate::methods::carried::{Carried, Sender};
 use crate::report::explanation::Light;
 use crate::stages::elements::{BACK_SIDE, Elements, NO_ELEMENT};
 use crate::stages::film::Film;
@@ -31,7 +32,7 @@ pub fn explain(
     pixel: UVec2,
     parts: &mut Parts,
 ) -> Result<Vec<String>, AppError> {
-    let Frame { context, request, stage, film, watch } = frame;
+    let Frame { context, request, stage, film, .. } = frame;
     let (weights, mut seen) = weights(frame, shown, pixel, parts)?;
     let method = &mut shown.method;
     let (direct, indirect) = method.look(context, &stage.world, &stage.view)?;
@@ -55,36 +56,51 @@ pub fn explain(
         Some(angle) => averaged(&context.download(&method.elements().normals)?, method.elements(), angle, &weights),
         None => weights.clone(),
     };
-    let mut before: Vec<Vec3> = vec![Vec3::ZERO; method.elements().count as usize];
+    method.keep_sent(context, true)?;
+    let told = tell_links(frame, &mut **method, &gathered, parts);
+    method.keep_sent(context, false)?;
+    told?;
+    debug_assert_eq!(film.pixel_count(), request.width * request.height);
+    Ok(seen)
+}
+
+/// What came along links, bounce by bounce; `gathered`: what each element counts in the pixel.
+fn tell_links(
+    frame: Frame<'_>,
+    method: &mut dyn OnElements,
+    gathered: &Weights,
+    parts: &mut Parts,
+) -> Result<(), AppError> {
+    let Frame { context, request, stage, watch, .. } = frame;
+    let elements: Vec<u32> = gathered.keys().copied().collect();
+    let mut before: Vec<HashMap<Sender, Vec3>> = vec![HashMap::new(); elements.len()];
     for bounce in 1..=request.bounces {
         watch.step("explain", u64::from(bounce) - 1, request.bounces.into())?;
         method.solve_again(context, &explicit_stage(stage, watch), bounce)?;
-        let key = |source| (Light::Indirect, method.bounces_are_apart().then_some(bounce), source, String::new());
-        if method.keeps_links() {
-            for (&element, &weight) in &gathered {
-                for carried in method.carried_to(context, element)? {
-                    let source = match carried.from {
-                        Sender::Element(sender) => name(stage, method.elements(), sender),
-                        Sender::Node { node, first, leaf_count } => {
-                            format!("node {node} of {leaf_count}, {}", name(stage, method.elements(), first))
-                        }
-                        Sender::Neighbours => "neighbours of elements inside something".into(),
-                        Sender::Glossy => "glossy senders' tables".into(),
-                    };
-                    add(parts, key(source), weight * carried.irradiance.as_dvec3());
+        let told = method.bounces_are_apart().then_some(bounce);
+        let carried = method.carried_to(context, &elements)?;
+        for ((&weight, before), carried) in gathered.values().zip(&mut before).zip(carried) {
+            for Carried { from, irradiance } in carried {
+                let source = match from {
+                    Sender::Element(sender) => name(stage, method.elements(), sender),
+                    Sender::Node { node, first, leaf_count } => {
+                        format!("node {node} of {leaf_count}, {}", name(stage, method.elements(), first))
+                    }
+                    Sender::Neighbours => "neighbours of elements inside something".into(),
+                    Sender::Glossy => "glossy senders' tables".into(),
+                    Sender::Floor => "what is not taken away below zero, and rounding".into(),
+                };
+                let mut added = irradiance;
+                if method.bounces_add_up() {
+                    added -= before.insert(from, irradiance).unwrap_or_default();
+                }
+                if added != Vec3::ZERO {
+                    add(parts, (Light::Indirect, told, source, String::new()), weight * added.as_dvec3());
                 }
             }
-        } else {
-            let now = context.download(method.indirect_irradiance())?;
-            for (&element, &weight) in &weights {
-                let (at, source) = (element as usize, name(stage, method.elements(), element));
-                add(parts, key(format!("light on {source}")), weight * (now[at] - before[at]).as_dvec3());
-            }
-            before = now;
         }
     }
-    debug_assert_eq!(film.pixel_count(), request.width * request.height);
-    Ok(seen)
+    Ok(())
 }
 
 /// What the samples of the pixel see of which element, and what they see.

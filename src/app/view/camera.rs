@@ -50,13 +50,18 @@ pub fn turn(camera: &mut FreeCamera, mode: CameraMode, pixels: Vec2) {
     }
 }
 
-/// Moves sideways so that what is looked at follows the mouse, in a picture so many pixels high.
-pub fn pan(camera: &mut FreeCamera, pixels: Vec2, height: f32) {
+/// How far so many pixels are, across what is `depth` metres away, in a picture so many pixels high.
+pub fn across(camera: &FreeCamera, pixels: Vec2, depth: f32, height: f32) -> Vec3 {
     let forward = camera.look_at - camera.eye;
     let right = forward.cross(Vec3::Y).try_normalize().unwrap_or(Vec3::X);
     let up = right.cross(forward).normalize_or_zero();
-    let metres_per_pixel = 2.0 * forward.length() * (camera.fov.to_radians() * 0.5).tan() / height.max(1.0);
-    let step = (up * pixels.y - right * pixels.x) * metres_per_pixel;
+    let metres_per_pixel = 2.0 * depth * (camera.fov.to_radians() * 0.5).tan() / height.max(1.0);
+    (right * pixels.x - up * pixels.y) * metres_per_pixel
+}
+
+/// Moves sideways so that what is looked at follows the mouse, in a picture so many pixels high.
+pub fn pan(camera: &mut FreeCamera, pixels: Vec2, height: f32) {
+    let step = -across(camera, pixels, (camera.look_at - camera.eye).length(), height);
     camera.eye += step;
     camera.look_at += step;
 }

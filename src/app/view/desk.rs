@@ -12,6 +12,7 @@ use crate::app::render::RenderRequest;
 use crate::gpu::{Capture, Context};
 use crate::report::explanation::Explanation;
 use crate::report::profile::SceneFacts;
+use crate::report::trace::TimeLine;
 use crate::scene::camera::View;
 use crate::stages::film::Film;
 use crate::stages::work::{Interrupted, Unwatched, Watch};
@@ -91,6 +92,46 @@ struct Papers {
     news: News,
     is_cancelled: bool,
     is_closing: bool,
+}
+
+/// A capture of one picture, and which.
+pub struct Capturing<'c> {
+    /// Until it is taken.
+    pub capture: Option<Capture<'c>>,
+    /// Counted from 1; the first in full quality where none is named.
+    pub picture: Option<u32>,
+}
+
+impl<'c> Capturing<'c> {
+    /// Renders picture `number`, and captures it where it is the one.
+    fn render(
+        &mut self,
+        engine: &mut Engine<'c>,
+        job: &Job,
+        number: u32,
+        watch: &dyn Watch,
+    ) -> Result<Arc<Film>, AppError> {
+        let mut film = None;
+        if self.picture.is_none() {
+            film = Some(engine.render(&job.request, watch)?);
+        }
+        let is_the_one = self.picture.map_or(!job.is_preview, |picture| picture == number);
+        let Some(mut capture) = self.capture.take_if(|_| is_the_one) else {
+            return film.map_or_else(|| engine.render(&job.request, watch), Ok);
+        };
+        capture.start();
+        // Where it is made for a second time everything is prepared: the capture holds a frame and nothing else.
+        let unwatched = film.is_some();
+        match engine.render(&job.request, if unwatched { &Unwatched } else { watch }) {
+            Ok(film) => Ok(capture.finish().map(|()| film)?),
+            Err(error) => {
+                // A newer picture was asked for meanwhile: that one, then.
+                capture.abandon();
+                self.capture = Some(capture);
+                Err(error)
+            }
+        }
+    }
 }
 
 /// One thing for the renderer to do.
@@ -191,8 +232,9 @@ impl Desk {
         papers.news.shown.is_some() || papers.news.end.is_some() || papers.news.is_working
     }
 
-    /// Renders what is asked for until closed.
-    pub fn work<'c>(&self, mut engine: Engine<'c>, mut capture: Option<Capture<'c>>) {
+    /// Renders what is asked for until closed. Times go to `time_line`, where there is one.
+    pub fn work<'c>(&self, mut engine: Engine<'c>, mut capturing: Option<Capturing<'c>>, time_line: Option<&TimeLine>) {
+        let mut pictures = 0;
         let mut bench = Bench { context: engine.context(), other: None, request: None, film: None, compared: None };
         while let Some(order) = self.next() {
             let job = match order {
@@ -226,15 +268,17 @@ impl Desk {
             if job.is_anew {
                 engine.prepare_anew();
             }
-            let mut result = engine.render(&job.request, &watch);
-            if result.is_ok()
-                && let Some(mut capture) = capture.take_if(|_| !job.is_preview)
-            {
-                // Everything is prepared: the capture holds a frame and nothing else.
-                capture.start();
-                result = engine.render(&job.request, &Unwatched);
-                let finished = capture.finish().map_err(AppError::from);
-                result = result.and_then(|film| finished.map(|()| film));
+            pictures += 1;
+            let mut render = || match &mut capturing {
+                Some(capturing) => capturing.render(&mut engine, &job, pictures, &watch),
+                None => engine.render(&job.request, &watch),
+            };
+            let result = match time_line {
+                Some(time_line) => time_line.span(&format!("picture {pictures}"), render),
+                None => render(),
+            };
+            if result.is_err() {
+                pictures -= 1;
             }
             let mut papers = self.lock();
             papers.news.progress = None;

@@ -18,7 +18,7 @@ use crate::scene::pose::PosedLight;
 use crate::scene::{LightKind, Material, Scene};
 use crate::stages::film::Film;
 use crate::stages::work::Watch;
-use glam::UVec2;
+use glam::{Mat3, UVec2, Vec3};
 
 /// How deep a change of the request goes; each needs what stands after it too.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -97,16 +97,35 @@ const YARDSTICK_ROUNDS: usize = 5;
 
 /// What was clicked at.
 pub enum Picked {
-    /// Index in the scene's lights.
-    Light(u32),
+    /// Index in the scene's lights, and where it is held.
+    Light(u32, Handle),
     Surface(Box<Surface>),
+}
+
+impl Picked {
+    pub fn handle(&self) -> Handle {
+        match self {
+            Self::Light(_, handle) => *handle,
+            Self::Surface(surface) => surface.handle,
+        }
+    }
+}
+
+/// How what was picked follows the mouse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Handle {
+    pub node: u32,
+    /// Metres from the eye's plane.
+    pub depth: f32,
+    /// Of directions: edits move nodes along their parents' axes.
+    pub parent_from_world: Mat3,
 }
 
 /// A surface of the scene as it is edited now.
 pub struct Surface {
     pub material_index: u32,
     pub material: Material,
-    pub node_index: u32,
+    pub handle: Handle,
     pub node: String,
     pub triangle: usize,
     /// Metres from the eye.
@@ -271,8 +290,16 @@ impl<'c> Engine<'c> {
             let at = stage.view.project(light.position, size);
             light.kind != LightKind::Directional && at.is_some_and(|(at, _)| at.distance(pixel.as_vec2()) < LIGHT_REACH)
         };
+        let handle = |node: u32, place: Vec3| {
+            let parent = stage.scene.nodes[node as usize].parent;
+            let world_from_parent = parent.map(|parent| stage.pose.world_from_node[parent as usize]);
+            let inverse = world_from_parent.map(|matrix| Mat3::from_mat4(matrix).inverse());
+            // A parent without extent moves nothing.
+            let parent_from_world = inverse.map_or(Mat3::IDENTITY, |m| if m.is_finite() { m } else { Mat3::ZERO });
+            Handle { node, depth: (place - stage.view.position).dot(stage.view.forward), parent_from_world }
+        };
         if let Some(light) = stage.pose.lights.iter().find(near_pixel) {
-            return Ok(Some(Picked::Light(light.light)));
+            return Ok(Some(Picked::Light(light.light, handle(light.node, light.position))));
         }
         let positions = self.context.download(&stage.world.positions)?;
         let triangles = self.context.download(&stage.world.triangles)?;
@@ -280,10 +307,11 @@ impl<'c> Engine<'c> {
         let part = &stage.geometry.parts[stage.geometry.triangle_part[seen.triangle] as usize];
         let material = stage.scene.materials[part.material as usize].clone();
         let node = stage.scene.nodes[part.node as usize].name.clone();
+        let ray = stage.view.ray(pixel.as_vec2() + 0.5, size);
         Ok(Some(Picked::Surface(Box::new(Surface {
             material_index: part.material,
             material,
-            node_index: part.node,
+            handle: handle(part.node, ray.origin + seen.distance * ray.direction),
             node,
             triangle: seen.triangle,
             distance: seen.distance,

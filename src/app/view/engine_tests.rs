@@ -1,7 +1,6 @@
 //! Whatever an engine did before, its picture is the one that a new engine renders.
 
 use clap::Parser as _;
-use glam::{UVec2, Vec3};
 
 use super::*;
 use crate::app::cli::{Cli, Command};
@@ -115,16 +114,54 @@ fn a_click_finds_what_the_pixel_shows() {
     assert_eq!(scene.materials[surface.material_index as usize].name, surface.material.name);
 }
 
+#[test]
+fn what_was_picked_is_dragged_along_the_picture() {
+    let context = context();
+    let mut engine = Engine::new(&context);
+    let plain = request("builtin:tea-room --method path-tracing");
+    engine.render(&plain, &Unwatched).unwrap();
+    let place = |engine: &Engine<'_>, triangle: usize| {
+        let world = &engine.stage().unwrap().world;
+        let vertex = context.download(&world.triangles).unwrap()[triangle].x;
+        context.download(&world.positions).unwrap()[vertex as usize]
+    };
+    let (mut moved, mut nodes) = (0, std::collections::BTreeSet::new());
+    for pixel in (0..600).step_by(61).map(|i| UVec2::new(i % 30, i / 30)) {
+        let Some(Picked::Surface(surface)) = engine.pick(&plain, pixel).unwrap() else { continue };
+        let handle = surface.handle;
+        assert!(handle.depth > 0.0 && handle.depth <= surface.distance * 1.001, "{handle:?}, {} m", surface.distance);
+        if !nodes.insert(handle.node) {
+            continue;
+        }
+        let (before, metres) = (place(&engine, surface.triangle), Vec3::new(0.25, -0.5, 0.125));
+        let mut edits = Vec::new();
+        crate::app::view::editor::drag(&handle, 0.5 * metres, &mut edits);
+        crate::app::view::editor::drag(&handle, 0.5 * metres, &mut edits);
+        assert_eq!(edits.len(), 1, "one edit grows");
+        engine.render(&RenderRequest { edits, ..plain.clone() }, &Unwatched).unwrap();
+        let after = place(&engine, surface.triangle);
+        assert!((after - before).distance(metres) < 1e-4, "node {}: {before} to {after}", handle.node);
+        engine.render(&plain, &Unwatched).unwrap();
+        moved += 1;
+    }
+    assert!(moved >= 2, "{moved} nodes");
+    assert_eq!(context.validation_messages(), [""; 0]);
+}
+
 /// Frames of [`frames_with_everything_moving_allocate_nothing`]; LINKLIGHT_FRAMES=1000 for a longer film.
 const FRAMES: &str = "60";
 
 #[test]
 fn frames_with_everything_moving_allocate_nothing() {
-    const WARM_UP: u32 = 3;
     let frames: u32 = std::env::var("LINKLIGHT_FRAMES").as_deref().unwrap_or(FRAMES).parse().unwrap();
     let context = context();
     // Links of all elements in every frame take their time.
-    for (method, frames) in [("path-tracing", frames), ("implicit-visibility --set bins=4", frames.div_ceil(8))] {
+    for (method, frames, warm_up) in [
+        ("path-tracing", frames, 3),
+        ("implicit-visibility --set bins=4", frames.div_ceil(8), 3),
+        // Two sets of links, each in some frames, and room for more of them than before.
+        ("explicit-visibility --set rays_per_element=16 --set link_budget=4000", frames, 14),
+    ] {
         let mut engine = Engine::new(&context);
         let (mut made, mut held) = ((0, 0), 0);
         let mut last = (Vec::new(), Vec::new());
@@ -143,9 +180,9 @@ fn frames_with_everything_moving_allocate_nothing() {
             last = now;
             context.take_records();
             let memory: u64 = context.memory_by_owner().values().map(|memory| memory.current_bytes).sum();
-            if frame == WARM_UP {
+            if frame == warm_up {
                 (made, held) = ((context.allocation_count(), context.pipeline_count()), memory);
-            } else if frame > WARM_UP {
+            } else if frame > warm_up {
                 let now = (context.allocation_count(), context.pipeline_count());
                 assert_eq!((now, memory), (made, held), "{method}: allocations, pipelines, bytes after frame {frame}");
             }

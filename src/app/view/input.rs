@@ -5,6 +5,7 @@ use glam::{UVec2, Vec2, Vec3};
 
 use super::camera::{self, CameraMode};
 use super::desk::Desk;
+use super::editor;
 use super::viewer::Viewer;
 use crate::app::render::FreeCamera;
 use crate::methods::METHODS;
@@ -99,6 +100,12 @@ impl Viewer {
         let notches =
             if response.hovered() { ui.ctx().input(|input| input.smooth_scroll_delta().y) / 50.0 } else { 0.0 };
         let (mode, rows) = (self.camera_mode, height as f32);
+        // What was picked follows the mouse; the picture follows when it is let go.
+        let moves_picked = self.picked.is_some() && ui.ctx().input(|input| input.modifiers.shift);
+        if moves_picked && response.dragged_by(PointerButton::Primary) {
+            self.move_picked(dragged, rows);
+            return;
+        }
         if response.dragged() {
             self.is_steering = true;
         }
@@ -121,6 +128,14 @@ impl Viewer {
         }
         if notches != 0.0 {
             self.move_camera(|camera| camera::dolly(camera, notches));
+        }
+    }
+
+    fn move_picked(&mut self, pixels: Vec2, rows: f32) {
+        let (Some(camera), Some(picked)) = (self.free_camera(), &self.picked) else { return };
+        if pixels != Vec2::ZERO {
+            let handle = picked.handle();
+            editor::drag(&handle, camera::across(&camera, pixels, handle.depth, rows), &mut self.args.edit);
         }
     }
 

@@ -38,8 +38,9 @@ use super::cli::{Global, ViewArgs};
 use super::crash;
 use super::render::{check_validation, device_options};
 use crate::gpu::{Capture, Context, Options, ShaderWatcher, prepare_capture};
+use crate::report::trace::TimeLine;
 use crate::report::write::check_writable;
-use desk::Desk;
+use desk::{Capturing, Desk};
 use engine::Engine;
 use viewer::Viewer;
 use window::ViewWindow;
@@ -57,8 +58,10 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     if !args.shots.is_dir() {
         return Err(AppError::Usage(format!("--shots {} is no folder; make it first", args.shots.display())));
     }
-    if let Some(path) = &args.capture {
+    for path in [&args.capture, &args.profile, &args.trace].into_iter().flatten() {
         check_writable(path)?;
+    }
+    if args.capture.is_some() {
         prepare_capture()?;
     }
     // The options of the last picture that was asked for.
@@ -81,18 +84,23 @@ pub fn run(args: &ViewArgs, global: &Global) -> Result<(), AppError> {
     let info = context.info();
     tracing::info!("device {} {} ({})", info.index, info.name, info.driver);
     let capture = args.capture.as_ref().map(|path| Capture::new(&context, path)).transpose()?;
+    let capturing = capture.map(|capture| Capturing { capture: Some(capture), picture: args.capture_frame });
+    let time_line = args.trace.as_ref().map(|_| TimeLine::default());
     // A closed event loop needs no news.
     let desk = Arc::new(Desk::new(move || {
         let _ = proxy.send_event(());
     }));
     let result = std::thread::scope(|scope| {
         let renderer = std::thread::Builder::new().name("renderer".into());
-        renderer.spawn_scoped(scope, || desk.work(Engine::new(&context), capture))?;
+        renderer.spawn_scoped(scope, || desk.work(Engine::new(&context), capturing, time_line.as_ref()))?;
         // However this ends, the renderer is not left waiting.
         let _closing = Closing(&desk);
         let mut window = ViewWindow::new(&context, &desk, viewer, shaders);
         let result = event_loop.run_app(&mut window).map_err(no_window);
-        window.finish().and(result)
+        result?;
+        window.finish()
     });
-    result.and_then(|()| check_validation(&context))
+    let viewer = result?;
+    viewer.write_measurements(&context, time_line.as_ref(), args)?;
+    check_validation(&context)
 }

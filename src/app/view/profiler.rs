@@ -20,8 +20,8 @@ pub struct Profiler {
     frames: VecDeque<FrameTimes>,
     /// Of the frame being rendered.
     pending: Vec<PassRecord>,
-    /// The last whole frame, as the device recorded it.
-    pub last: Vec<PassRecord>,
+    /// Whole frames, as the device recorded them, where they are asked for in the end.
+    kept: Option<VecDeque<Vec<PassRecord>>>,
     /// Of the window's own passes, ms.
     window_ms: f64,
     /// What a copy moves, bytes a millisecond; `None` until it is measured.
@@ -44,6 +44,17 @@ struct Node<'p> {
 }
 
 impl Profiler {
+    /// `keeps_records`: for [`Self::kept`].
+    pub fn new(keeps_records: bool) -> Self {
+        Self { kept: keeps_records.then(VecDeque::new), ..Self::default() }
+    }
+
+    /// The last frames: how many, and their records.
+    pub fn kept(&self) -> (u32, Vec<PassRecord>) {
+        let frames = self.kept.iter().flatten();
+        (frames.clone().count() as u32, frames.flatten().cloned().collect())
+    }
+
     /// Takes what ran since the last call; the window's own passes are apart.
     pub fn take(&mut self, records: Vec<PassRecord>) {
         let (own, others): (Vec<_>, Vec<_>) =
@@ -55,8 +66,14 @@ impl Profiler {
 
     /// A frame was finished after so many milliseconds.
     pub fn finish_frame(&mut self, wall_ms: f64) {
-        self.last = std::mem::take(&mut self.pending);
-        let passes = summarise(&measure::pass_records(self.last.clone()));
+        let records = std::mem::take(&mut self.pending);
+        if let Some(kept) = &mut self.kept {
+            kept.push_back(records.clone());
+            if kept.len() > WINDOW {
+                kept.pop_front();
+            }
+        }
+        let passes = summarise(&measure::pass_records(records));
         let gpu_ms = passes.iter().map(|pass| pass.ms.total).sum();
         self.frames.push_back(FrameTimes { passes, wall_ms, gpu_ms });
         while self.frames.len() > WINDOW {
@@ -208,7 +225,7 @@ mod tests {
 
     #[test]
     fn scopes_sum_their_passes_and_the_window_stays_apart() {
-        let mut profiler = Profiler::default();
+        let mut profiler = Profiler::new(true);
         profiler.take(vec![
             record("frame/a/gather/links", "gather/links", 2),
             record("window/display/interface", "display/interface", 7),
@@ -217,7 +234,9 @@ mod tests {
         profiler.take(vec![record("frame/b/gather/links", "gather/links", 4)]);
         profiler.finish_frame(12.0);
         let frame = profiler.frames.back().unwrap();
-        assert_eq!((frame.gpu_ms, frame.wall_ms, profiler.last.len()), (9.0, 12.0, 3));
+        assert_eq!((frame.gpu_ms, frame.wall_ms), (9.0, 12.0));
+        let (frames, records) = profiler.kept();
+        assert_eq!((frames, records.len()), (1, 3), "the window's own passes are not among them");
         let root = tree(&frame.passes);
         let (name, top) = &root.children[0];
         assert_eq!((*name, top.ms, top.children.len()), ("frame", 9.0, 2));
@@ -227,11 +246,12 @@ mod tests {
 
     #[test]
     fn only_the_last_frames_stay() {
-        let mut profiler = Profiler::default();
+        let mut profiler = Profiler::new(true);
         for _ in 0..3 * WINDOW {
             profiler.take(vec![record("frame/x/y", "x/y", 1); 3]);
             profiler.finish_frame(1.0);
         }
         assert_eq!((profiler.frames.len(), profiler.pending.len()), (WINDOW, 0));
+        assert_eq!(profiler.kept().0, WINDOW as u32);
     }
 }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use egui::{CentralPanel, Ui};
+use serde_json::Value;
 
 use super::camera::{self, CameraMode};
 use super::comparison::{Compared, Comparison, Layout, OtherJob};
@@ -14,6 +15,7 @@ use super::engine::{Picked, change};
 use super::panel;
 use super::profiler::Profiler;
 use crate::app::cli::{Display, PictureArgs, ViewArgs};
+use crate::app::output::Measured;
 use crate::app::render::{FreeCamera, RenderRequest};
 use crate::app::values::{Format, Output};
 use crate::app::{AppError, crash, frame, output, state, views};
@@ -23,6 +25,7 @@ use crate::methods::Method;
 use crate::methods::settings::Assignment;
 use crate::report::explanation::Explanation;
 use crate::report::tonemap::{Operator, ToneSettings};
+use crate::report::trace::TimeLine;
 use crate::stages::film::Film;
 
 /// Width of the panel, points.
@@ -71,6 +74,8 @@ pub struct Viewer {
     /// Options of both pictures of the comparison that was asked for.
     asked_other: Option<(Vec<String>, &'static str)>,
     asked_words: Arc<Mutex<String>>,
+    /// Further devices that make links.
+    link_gpus: Vec<String>,
     /// Of the picture's top left pixel in the frame.
     pub(super) corner: [u32; 2],
     shots: PathBuf,
@@ -117,7 +122,7 @@ impl Viewer {
             explanation: None,
             asked_other: None,
             memory: BTreeMap::new(),
-            profiler: Profiler::default(),
+            profiler: Profiler::new(args.profile.is_some() || args.trace.is_some()),
             shows_profile: false,
             shader_errors: BTreeMap::new(),
             is_anew: false,
@@ -126,6 +131,7 @@ impl Viewer {
             posted: None,
             asked: None,
             asked_words: asked,
+            link_gpus: args.link_gpu.clone(),
             corner: [0; 2],
             shots: args.shots.clone(),
             last_tick: Instant::now(),
@@ -334,6 +340,23 @@ impl Viewer {
         Ok(())
     }
 
+    /// Writes what was measured of the last pictures, where that was asked for.
+    pub fn write_measurements(
+        &self,
+        context: &Context,
+        time_line: Option<&TimeLine>,
+        args: &ViewArgs,
+    ) -> Result<(), AppError> {
+        let (Some(shown), true) = (&self.shown, args.profile.is_some() || args.trace.is_some()) else { return Ok(()) };
+        let (frames, records) = self.profiler.kept();
+        let mut request = shown.job.request.clone();
+        (request.profile, request.trace, request.frames) = (args.profile.clone(), args.trace.clone(), frames);
+        let nothing = TimeLine::default();
+        let time_line = time_line.unwrap_or(&nothing);
+        let measured = Measured { context, time_line, records, scene: shown.facts.clone(), method: Value::Null };
+        output::write_measurements(&request, measured, &mut std::io::sink())
+    }
+
     /// The film shown is the one that the options decide, in full quality.
     fn is_settled(&self) -> bool {
         let Some(shown) = &self.shown else { return false };
@@ -358,6 +381,9 @@ impl Viewer {
                 self.complaint = None;
                 if is_preview {
                     request.spp = 1;
+                }
+                if request.method.key == "explicit-visibility" {
+                    request.link_gpus.clone_from(&self.link_gpus);
                 }
                 let same = |asked: &Job| asked.is_preview == is_preview && change(&asked.request, &request).is_none();
                 if !self.asked.as_ref().is_some_and(same) {

@@ -55,8 +55,8 @@ impl<'c> ViewWindow<'c> {
     }
 
     /// How it ended.
-    pub fn finish(self) -> Result<(), AppError> {
-        self.error.map_or(Ok(()), Err)
+    pub fn finish(self) -> Result<Viewer, AppError> {
+        self.error.map_or(Ok(self.viewer), Err)
     }
 
     fn open(&self, event_loop: &ActiveEventLoop) -> Result<Open, AppError> {

@@ -14,6 +14,7 @@ use crate::stages::hierarchy::{Hierarchy, NONE};
 use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
 use crate::stages::scan::{self, ScanScratch};
 use glam::UVec2;
+use std::collections::HashMap;
 use std::f32::consts::PI;
 use std::ops::Range;
 
@@ -205,6 +206,25 @@ impl Transfers {
             };
             recorder.dispatch(&pass, slice_count * SLICE);
         }
+    }
+
+    /// The transfers (sender's entry in a table, weight) of the cells that `cells` has.
+    pub fn of_cells(&self, context: &Context, cells: &mut HashMap<u32, Vec<(u32, f32)>>) -> Result<(), GpuError> {
+        let (work, ends) = (context.download(&self.work)?, context.download(&self.cells)?);
+        let offsets = context.download(&self.slice_offsets)?;
+        for window in &self.windows {
+            let words = context.download(&window.transfers)?;
+            for slot in window.slices.start * SLICE..window.slices.end * SLICE {
+                let cell = work[slot as usize];
+                let Some(transfers) = cells.get_mut(&cell) else { continue };
+                let start = offsets[(slot / SLICE) as usize] + slot % SLICE;
+                transfers.extend((start..ends[cell as usize]).step_by(SLICE as usize).map(|place| {
+                    let word = words[(place - window.first_transfer) as usize];
+                    (word as u32, f32::from_bits((word >> 32) as u32))
+                }));
+            }
+        }
+        Ok(())
     }
 
     /// All transfers: (receiver x bins + bin, sender x bins + bin, weight), in that order.

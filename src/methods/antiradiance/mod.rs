@@ -37,6 +37,7 @@
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
 mod bin_count;
+mod carried;
 mod gloss;
 mod linking;
 mod report;
@@ -111,6 +112,7 @@ pub struct Antiradiance {
     source_power: f64,
     /// Of the last symmetric iteration: share of its steps.
     damping: f32,
+    kept: Option<carried::Kept>,
     report: Report,
 }
 
@@ -186,6 +188,7 @@ impl Antiradiance {
             bounced: 1.0,
             source_power: 0.0,
             damping: settings.damping,
+            kept: None,
             settings,
             elements,
             emitters,

@@ -210,6 +210,10 @@ impl Antiradiance {
     /// One application of U and what follows; its residual is kept and watched.
     fn step_once(&mut self, context: &Context, bounce: u32, step: LocalStep) -> Result<Residual, AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
+        if let Some(kept) = &mut self.kept {
+            recorder.copy(&self.tables.exitant, &kept.exitant);
+            kept.step = step;
+        }
         recorder.scope(format_args!("bounce {bounce}"), |recorder| {
             self.tables.step(recorder, &self.transfers, &self.hierarchy, &self.bins, &self.elements, step);
         });

@@ -136,7 +136,7 @@ impl Antiradiance {
 }
 
 /// An entry of a table from its words, as `table.glsl` has it.
-fn entry(words: &[u64]) -> Vec3 {
+pub(super) fn entry(words: &[u64]) -> Vec3 {
     let low = |word: u64| word as u32;
     let high = |word: u64| (word >> 32) as u32;
     match words {

@@ -9,22 +9,10 @@
 //!
 //! [Schmitz2008]: crate::methods::PAPERS
 
-use super::linking::{Linked, Linking};
+use super::linking::Linked;
 use super::{ExplicitError, ExplicitVisibility, Report, Stage};
 use crate::gpu::Context;
-use crate::stages::false_color;
 use crate::stages::links::Outcomes;
-use glam::Vec3;
-
-crate::choice! {
-    /// What a picture shows.
-    pub enum Shown {
-        /// Light
-        Light = "light",
-        /// How many frames ago the links of each element were made: blue this one, red the oldest
-        LinkAge = "link-age",
-    }
-}
 
 /// What is known of the age of links, in frames.
 #[derive(Default)]
@@ -38,12 +26,12 @@ pub(super) struct Ages {
     /// The frame in which the first of them was.
     begun: u32,
     pending: Option<Pending>,
+    /// Of the links under way, or of those before the present ones.
+    outcomes: Option<Outcomes>,
 }
 
-/// Links under way.
+/// Links under way, which [`super::linking::Linking`] holds.
 struct Pending {
-    linking: Linking,
-    outcomes: Outcomes,
     made: Vec<u32>,
     begun: u32,
 }
@@ -51,7 +39,8 @@ struct Pending {
 impl Ages {
     /// All links are those of now.
     pub fn renew(&mut self) {
-        *self = Self { frame: self.frame, moved: self.frame, begun: self.frame, ..Self::default() };
+        let outcomes = self.outcomes.take();
+        *self = Self { frame: self.frame, moved: self.frame, begun: self.frame, outcomes, ..Self::default() };
     }
 }
 
@@ -82,33 +71,32 @@ impl ExplicitVisibility {
         Ok(recorder.submit()?)
     }
 
+    /// The next of the links to come. After an error they start anew.
     fn relink(&mut self, context: &Context, stage: &Stage<'_>, rays: u32) -> Result<(), ExplicitError> {
-        let (settings, elements, sizes) = (&self.settings, &self.elements, &self.sizes);
-        let frame = self.ages.frame;
-        let mut pending = match self.ages.pending.take() {
-            Some(pending) => pending,
-            None => {
-                let outcomes = Outcomes::new(context, elements.count, settings.rays_per_element.get())?;
-                let linked = Linked { settings, elements, outcomes: &outcomes, sizes };
-                let linking = Linking::new(context, linked)?;
-                Pending { linking, outcomes, made: Vec::new(), begun: frame }
-            }
+        let Self { settings, elements, sizes, linking, ages, .. } = self;
+        let frame = ages.frame;
+        let outcomes = match &mut ages.outcomes {
+            Some(outcomes) => outcomes,
+            none => none.insert(Outcomes::new(context, elements.count, settings.rays_per_element.get())?),
         };
+        let linked = Linked { settings, elements, outcomes, sizes };
+        let mut pending = ages.pending.take().unwrap_or_else(|| {
+            linking.start_at(0);
+            Pending { made: Vec::new(), begun: frame }
+        });
         let mut left = sizes.elements_of(rays);
-        while left > 0 && !pending.linking.is_done(elements) {
-            let linked = Linked { settings, elements, outcomes: &pending.outcomes, sizes };
-            let (linking, done) = pending.linking.step(context, stage, linked, left)?;
-            pending.linking = linking;
+        while left > 0 && !linking.is_done(elements) {
+            let done = linking.step(context, stage, linked, left)?;
             pending.made.extend(done.clone().map(|_| frame));
             left -= (done.len() as u32).min(left);
         }
-        if !pending.linking.is_done(elements) {
-            self.ages.pending = Some(pending);
+        if !linking.is_done(elements) {
+            ages.pending = Some(pending);
             return Ok(());
         }
-        self.links = pending.linking.finish(context);
-        self.outcomes = pending.outcomes;
-        (self.ages.made, self.ages.begun) = (pending.made, pending.begun);
+        linking.swap(&mut self.links);
+        std::mem::swap(&mut self.outcomes, outcomes);
+        (ages.made, ages.begun) = (pending.made, pending.begun);
         self.report =
             Report::new(context, &self.settings, &self.elements, &self.emitters, &self.links, &self.outcomes)?;
         Ok(())
@@ -132,19 +120,5 @@ impl ExplicitVisibility {
     /// Of the oldest links.
     pub fn oldest_link(&self) -> u32 {
         self.link_ages().into_iter().max().unwrap_or(0)
-    }
-
-    /// Ages as colours, where the settings ask for them.
-    pub fn view_colors(&self) -> Option<Vec<Vec3>> {
-        if self.settings.show == Shown::Light {
-            return None;
-        }
-        let (ages, oldest) = (self.link_ages(), self.oldest_link().max(1) as f32);
-        let color = |age: u32| false_color::of_amount(age as f32 / oldest);
-        Some(if ages.is_empty() {
-            vec![color(0); self.elements.count as usize]
-        } else {
-            ages.into_iter().map(color).collect()
-        })
     }
 }

@@ -15,7 +15,7 @@ use crate::scene::pose::Pose;
 use crate::stages::bvh::Bvh;
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::link_rows::Rows;
-use crate::stages::links::{LinkBuilder, Links, Outcomes};
+use crate::stages::links::Outcomes;
 use crate::stages::trace::Tracer;
 use crate::stages::work::Unwatched;
 use crate::stages::world::World;
@@ -31,6 +31,7 @@ pub struct Helper {
     sizes: Sizes,
     elements: Elements,
     outcomes: Outcomes,
+    linking: Linking,
     bvh: Bvh,
     world: World,
     // Dropped last: everything above is made on it.
@@ -57,7 +58,19 @@ impl Helper {
         let sizes = Sizes::new(&context, &topology, world.light_count, &settings, u64::MAX)?;
         let elements = Elements::new(&context, topology, stage.rest_positions, &world, settings.ray_offset)?;
         let outcomes = Outcomes::new(&context, elements.count, settings.rays_per_element.get())?;
-        Ok(Self { settings, sizes, elements, outcomes, bvh, world, context })
+        let linked = Linked { settings: &settings, elements: &elements, outcomes: &outcomes, sizes: &sizes };
+        let linking = Linking::new(&context, linked)?;
+        Ok(Self { settings, sizes, elements, outcomes, linking, bvh, world, context })
+    }
+
+    /// Takes over surfaces that moved from where they stand on the main device.
+    pub(super) fn follow(&self, main: &Context, world: &World) -> Result<(), ExplicitError> {
+        self.context.write(&self.world.positions, &main.download(&world.positions)?)?;
+        self.context.write(&self.world.normals, &main.download(&world.normals)?)?;
+        let mut recorder = self.context.recorder("explicit-visibility")?;
+        self.bvh.refit(&mut recorder, &self.world.positions)?;
+        self.elements.place(&mut recorder, &self.world);
+        Ok(recorder.submit()?)
     }
 
     /// Of its device, oldest first.
@@ -65,7 +78,7 @@ impl Helper {
         self.context.validation_messages()
     }
 
-    fn make(&self, stage: &Stage<'_>, range: Range<u32>) -> Result<Piece, ExplicitError> {
+    fn make(&mut self, stage: &Stage<'_>, range: Range<u32>) -> Result<Piece, ExplicitError> {
         let own = Stage {
             world: &self.world,
             tracer: Tracer::compute(&self.bvh, &self.world),
@@ -75,21 +88,25 @@ impl Helper {
             rest_positions: stage.rest_positions,
             environment: stage.environment,
         };
-        let Self { settings, elements, outcomes, sizes, context, .. } = self;
-        make(context, &own, Linked { settings, elements, outcomes, sizes }, range)
+        let Self { settings, elements, outcomes, sizes, linking, context, .. } = self;
+        make(context, &own, Linked { settings, elements, outcomes, sizes }, linking, range)
     }
 }
 
 /// The links of a run of elements, read back.
-fn make(context: &Context, stage: &Stage<'_>, linked: Linked<'_>, range: Range<u32>) -> Result<Piece, ExplicitError> {
-    let mut linking = Linking::from(context, linked, range.start)?;
+fn make(
+    context: &Context,
+    stage: &Stage<'_>,
+    linked: Linked<'_>,
+    linking: &mut Linking,
+    range: Range<u32>,
+) -> Result<Piece, ExplicitError> {
+    linking.start_at(range.start);
     let mut next = range.start;
     while next < range.end {
-        let done;
-        (linking, done) = linking.step(context, stage, linked, range.end - next)?;
-        next = done.end;
+        next = linking.step(context, stage, linked, range.end - next)?.end;
     }
-    let links = linking.finish(context);
+    let links = linking.builder.links();
     let words = linked.settings.rays_per_element.get().div_ceil(32);
     let part = |buffer: &Buffer<u32>, each: u32| {
         context.download_range(buffer, (range.start * each) as usize..(range.end * each) as usize)
@@ -102,37 +119,38 @@ fn make(context: &Context, stage: &Stage<'_>, linked: Linked<'_>, range: Range<u
     })
 }
 
-/// The links of all elements, made by the main device and its helpers, and how many elements each had.
+/// Makes the links of all elements, which `linking` holds then; how many elements each device had.
 pub(super) fn build(
     context: &Context,
     stage: &Stage<'_>,
     linked: Linked<'_>,
-    helpers: &[Helper],
-) -> Result<(Links, Vec<u32>), ExplicitError> {
+    linking: &mut Linking,
+    helpers: &mut [Helper],
+) -> Result<Vec<u32>, ExplicitError> {
     let count = linked.elements.count;
     let devices = helpers.len() as u32 + 1;
     let first = (count / (FIRST_SHARE * devices)).min(linked.sizes.elements_at_once());
     // First batches stand at the start, one after another.
     let batches: Vec<Range<u32>> = (0..devices).map(|device| device * first..(device + 1) * first).collect();
-    let (mut pieces, seconds) = make_all(context, stage, linked, helpers, &batches)?;
+    let (mut pieces, seconds) = make_all(context, stage, linked, (&mut *linking, &mut *helpers), &batches)?;
     let rates: Vec<f64> = seconds.iter().map(|seconds| f64::from(first) / seconds.max(1e-9)).collect();
     let shares = shares(devices * first..count, &rates);
-    let (rest, _) = make_all(context, stage, linked, helpers, &shares)?;
+    let (rest, _) = make_all(context, stage, linked, (&mut *linking, helpers), &shares)?;
     let made = |device: usize| batches[device].len() as u32 + shares[device].len() as u32;
     let device_elements = (0..devices as usize).map(made).collect();
 
     pieces.extend(rest);
     pieces.sort_by_key(|piece| piece.elements.start);
-    let mut builder = LinkBuilder::resume(context, Linking::new(context, linked)?.pause());
+    linking.start_at(0);
     let words = linked.settings.rays_per_element.get().div_ceil(32);
     for piece in pieces.into_iter().filter(|piece| !piece.elements.is_empty()) {
         let mut recorder = context.recorder("links")?;
         recorder.write(&linked.outcomes.escaped, (piece.elements.start * words) as usize, &piece.escaped);
         recorder.write(&linked.outcomes.counts, piece.elements.start as usize, &piece.counts);
         recorder.submit()?;
-        builder.append_rows(piece.elements, &piece.rows)?;
+        linking.builder.append_rows(context, piece.elements, &piece.rows)?;
     }
-    Ok((builder.finish(), device_elements))
+    Ok(device_elements)
 }
 
 /// All runs at once, the first on the main device; pieces and the seconds they took.
@@ -140,7 +158,7 @@ fn make_all(
     context: &Context,
     stage: &Stage<'_>,
     linked: Linked<'_>,
-    helpers: &[Helper],
+    (linking, helpers): (&mut Linking, &mut [Helper]),
     runs: &[Range<u32>],
 ) -> Result<(Vec<Piece>, Vec<f64>), ExplicitError> {
     fn timed(make: impl FnOnce() -> Result<Piece, ExplicitError>) -> Result<(Piece, f64), ExplicitError> {
@@ -152,7 +170,7 @@ fn make_all(
     let Stage { scene, geometry, rest_positions, environment, world, tracer, .. } = *stage;
     std::thread::scope(|scope| {
         let others: Vec<_> = helpers
-            .iter()
+            .iter_mut()
             .zip(&runs[1..])
             .map(|(helper, run)| {
                 scope.spawn(move || {
@@ -162,7 +180,7 @@ fn make_all(
                 })
             })
             .collect();
-        let own = timed(|| make(context, stage, linked, runs[0].clone()));
+        let own = timed(|| make(context, stage, linked, linking, runs[0].clone()));
         let mut all = vec![own?];
         for other in others {
             all.push(other.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);

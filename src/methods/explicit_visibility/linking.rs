@@ -1,13 +1,13 @@
 //! From rays to links: batches of elements cast, trace and merge, within the memory there is.
 
-use super::{RayCount, Settings, Stage};
+use super::{Helper, RayCount, Settings, Stage, devices};
 use crate::gpu::shaders::methods::explicit_visibility as passes;
 use crate::gpu::shaders::types::{Hit, Ray};
 use crate::gpu::{Buffer, Context, GpuError};
 use crate::scene::environment::Environment;
 use crate::stages::bvh::BvhError;
 use crate::stages::elements::{ElementTopology, Elements};
-use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes, UnfinishedLinks};
+use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
 use crate::stages::trace;
 use crate::stages::work::Interrupted;
 use crate::stages::world::WorldEnvironment;
@@ -63,7 +63,9 @@ impl Sizes {
         let batch_bytes = batch * (u64::from(ray_count) * per_ray + LinkBuilder::batch_bytes(ray_count));
         let shadow_bytes = sizes.shadow_rays() as u64 * (size_of::<Ray>() + size_of::<u32>()) as u64;
         let light_words = 6 * 3 + u64::from(light_count);
-        let bit_words = u64::from(ray_count.div_ceil(32) + settings.emitter_samples.div_ceil(32) + 1);
+        // Links under way have offsets, and room for what is sent along them, of their own.
+        let idle_words = 3;
+        let bit_words = idle_words + u64::from(ray_count.div_ceil(32) + settings.emitter_samples.div_ceil(32) + 1);
         let needed =
             Elements::bytes_needed(topology) + batch_bytes + shadow_bytes + 4 * elements * (light_words + bit_words);
         let available = budget.min(context.available_bytes());
@@ -103,7 +105,7 @@ pub(super) struct Linked<'a> {
 pub(super) struct Linking {
     rays: Buffer<Ray>,
     hits: Buffer<Hit>,
-    unfinished: UnfinishedLinks,
+    pub builder: LinkBuilder,
     /// The first element without links.
     next: u32,
 }
@@ -115,17 +117,20 @@ impl Linking {
         let hits = context.buffer("links/hits", rays.len())?;
         let format = if settings.packed_links { LinkFormat::Packed } else { LinkFormat::Full };
         let counts = LinkCounts { receivers: elements.count, senders: elements.count, rays: ray_count, batch };
-        let unfinished = LinkBuilder::new(context, format, counts, link_budget)?.pause();
-        Ok(Self { rays, hits, unfinished, next: 0 })
+        let builder = LinkBuilder::new(context, format, counts, link_budget)?;
+        Ok(Self { rays, hits, builder, next: 0 })
     }
 
-    /// As [`Self::new`], from element `first` on.
-    pub fn from(context: &Context, linked: Linked<'_>, first: u32) -> Result<Self, ExplicitError> {
-        Ok(Self { next: first, ..Self::new(context, linked)? })
+    /// Leaves out what was made so far, and goes on from element `first`.
+    pub fn start_at(&mut self, first: u32) {
+        self.next = first;
+        self.builder.start_over();
     }
 
-    pub fn pause(self) -> UnfinishedLinks {
-        self.unfinished
+    /// Hands the links over in place of `links`, whose memory the next ones are made in.
+    pub fn swap(&mut self, links: &mut Links) {
+        self.next = 0;
+        self.builder.swap(links);
     }
 
     pub fn is_done(&self, elements: &Elements) -> bool {
@@ -134,18 +139,17 @@ impl Linking {
 
     /// Casts the rays of the next batch, of at most `most` elements, and makes their links; which elements those were.
     pub fn step(
-        mut self,
+        &mut self,
         context: &Context,
         stage: &Stage<'_>,
         linked: Linked<'_>,
         most: u32,
-    ) -> Result<(Self, Range<u32>), ExplicitError> {
+    ) -> Result<Range<u32>, ExplicitError> {
         let Linked { settings, elements, outcomes, sizes } = linked;
         let first_element = self.next;
         stage.watch.step("links", first_element.into(), elements.count.into())?;
         let range = first_element..elements.count.min(first_element + sizes.batch.min(most).max(1));
         let batch_rays = range.len() * sizes.ray_count as usize;
-        let mut builder = LinkBuilder::resume(context, self.unfinished);
         let mut recorder = context.recorder("links")?;
         let pass = passes::Rays {
             ray_origins: &elements.ray_origins,
@@ -161,27 +165,33 @@ impl Linking {
         recorder.dispatch(&pass, batch_rays);
         trace::closest_hit(&mut recorder, &stage.tracer, &self.rays, &self.hits, batch_rays);
         let world = stage.world;
-        builder.merge(&mut recorder, range.clone(), &self.hits, &world.triangles, &elements.back_elements, outcomes);
+        let (triangles, backs) = (&world.triangles, &elements.back_elements);
+        self.builder.merge(&mut recorder, range.clone(), &self.hits, triangles, backs, outcomes);
         recorder.submit()?;
-        builder.append(range.clone())?;
-        self.unfinished = builder.pause();
+        self.builder.append(context, range.clone())?;
         self.next = range.end;
-        Ok((self, range))
-    }
-
-    pub fn finish(self, context: &Context) -> Links {
-        LinkBuilder::resume(context, self.unfinished).finish()
+        Ok(range)
     }
 }
 
-/// Casts the rays of all elements and makes their links.                           [Schmitz2008 3.2]
-pub(super) fn build(context: &Context, stage: &Stage<'_>, linked: Linked<'_>) -> Result<Links, ExplicitError> {
-    let mut linking = Linking::new(context, linked)?;
+/// Casts the rays of all elements and makes their links, which `linking` holds then. How many elements each device had;
+/// empty where this one had all.                                                            [Schmitz2008 3.2]
+pub(super) fn build(
+    context: &Context,
+    stage: &Stage<'_>,
+    linked: Linked<'_>,
+    linking: &mut Linking,
+    helpers: &mut [Helper],
+) -> Result<Vec<u32>, ExplicitError> {
+    if !helpers.is_empty() {
+        return devices::build(context, stage, linked, linking, helpers);
+    }
+    linking.start_at(0);
     while !linking.is_done(linked.elements) {
-        (linking, _) = linking.step(context, stage, linked, u32::MAX)?;
+        linking.step(context, stage, linked, u32::MAX)?;
     }
     stage.watch.step("links", linked.elements.count.into(), linked.elements.count.into())?;
-    Ok(linking.finish(context))
+    Ok(Vec::new())
 }
 
 /// The environment at the density of the rays, so that none of its light falls between them.

@@ -36,17 +36,19 @@ mod devices;
 mod linking;
 mod ray_count;
 mod report;
+mod views;
 
-pub use asynchronous::Shown;
 pub use devices::Helper;
 pub use linking::ExplicitError;
 pub use ray_count::RayCount;
 pub use report::Report;
+pub use views::Shown;
 
 use crate::gpu::shaders::elements::{EmittedRadiosity, EmittedRadiosityParams, FillUnresolved, FillUnresolvedParams};
 use crate::gpu::shaders::methods::explicit_visibility as passes;
 use crate::gpu::shaders::types::Ray;
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
+use crate::methods::pick::Pick;
 use crate::scene::Scene;
 use crate::scene::environment::Environment;
 use crate::scene::geometry::Geometry;
@@ -58,7 +60,7 @@ use crate::stages::work::Watch;
 use crate::stages::world::{World, WorldEnvironment};
 use crate::stages::{gather, punctual};
 use glam::Vec3;
-use linking::{Linked, Sizes};
+use linking::{Linked, Linking, Sizes};
 
 crate::settings! {
     /// What explicit visibility lets the user choose.
@@ -82,6 +84,8 @@ crate::settings! {
         link_budget: u32 = 0, range 0..=4_000_000_000, unit "rays", paper "asynchronous, on a second device";
         /// What the picture shows.
         show: Shown = Shown::Light, paper "light";
+        /// The element whose links a view shows.
+        pick: Pick = Pick::Nothing, paper "not given";
         /// How far rays start off their surface, as a share of the scene's extent.
         ray_offset: f32 = 1e-5, range 1e-7..=1e-2, paper "not given";
     }
@@ -95,6 +99,10 @@ pub struct ExplicitVisibility {
     emitters: Emitters,
     links: Links,
     outcomes: Outcomes,
+    /// Makes the next links, in the memory of those before the present ones.
+    linking: Linking,
+    /// Further devices that make links.
+    helpers: Vec<Helper>,
     ages: asynchronous::Ages,
     state: State,
     /// Averaged to the density of the rays.
@@ -139,12 +147,12 @@ impl ExplicitVisibility {
         Self::prepare_within(context, stage, settings, u64::MAX)
     }
 
-    /// As [`Self::prepare`], with links made by `helpers` too.
+    /// As [`Self::prepare`], with links made by `helpers` too, now and whenever surfaces move.
     pub fn prepare_over(
         context: &Context,
         stage: &Stage<'_>,
         settings: Settings,
-        helpers: &[Helper],
+        helpers: Vec<Helper>,
     ) -> Result<Self, ExplicitError> {
         Self::prepare_by(context, stage, settings, u64::MAX, helpers)
     }
@@ -156,7 +164,7 @@ impl ExplicitVisibility {
         settings: Settings,
         budget: u64,
     ) -> Result<Self, ExplicitError> {
-        Self::prepare_by(context, stage, settings, budget, &[])
+        Self::prepare_by(context, stage, settings, budget, Vec::new())
     }
 
     fn prepare_by(
@@ -164,7 +172,7 @@ impl ExplicitVisibility {
         stage: &Stage<'_>,
         settings: Settings,
         budget: u64,
-        helpers: &[Helper],
+        mut helpers: Vec<Helper>,
     ) -> Result<Self, ExplicitError> {
         let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
         let sizes = Sizes::new(context, &topology, stage.world.light_count, &settings, budget)?;
@@ -174,10 +182,9 @@ impl ExplicitVisibility {
         let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
         let outcomes = Outcomes::new(context, elements.count, settings.rays_per_element.get())?;
         let linked = Linked { settings: &settings, elements: &elements, outcomes: &outcomes, sizes: &sizes };
-        let (links, device_elements) = match helpers {
-            [] => (linking::build(context, stage, linked)?, Vec::new()),
-            helpers => devices::build(context, stage, linked, helpers)?,
-        };
+        let mut linking = Linking::new(context, linked)?;
+        let device_elements = linking::build(context, stage, linked, &mut linking, &mut helpers)?;
+        let links = linking.builder.take(context)?;
         let mut method = Self {
             report: Report {
                 device_elements,
@@ -191,6 +198,8 @@ impl ExplicitVisibility {
             emitters,
             links,
             outcomes,
+            linking,
+            helpers,
             ages: asynchronous::Ages::default(),
         };
         let mut recorder = context.recorder("explicit-visibility")?;
@@ -206,14 +215,19 @@ impl ExplicitVisibility {
         self.elements.place(&mut recorder, stage.world);
         self.elements.update_materials(&mut recorder, stage.world);
         recorder.submit()?;
+        for helper in &self.helpers {
+            helper.follow(context, stage.world)?;
+        }
         // The old links go first: two sets may not fit.
         self.links.clear();
-        let (settings, elements) = (&self.settings, &self.elements);
-        let linked = Linked { settings, elements, outcomes: &self.outcomes, sizes: &self.sizes };
-        self.links = linking::build(context, stage, linked)?;
+        self.linking.builder.clear();
+        let Self { settings, elements, outcomes, sizes, linking, helpers, .. } = self;
+        let linked = Linked { settings, elements, outcomes, sizes };
+        let device_elements = linking::build(context, stage, linked, linking, helpers)?;
+        self.linking.swap(&mut self.links);
         self.ages.renew();
-        self.report =
-            Report::new(context, &self.settings, &self.elements, &self.emitters, &self.links, &self.outcomes)?;
+        let report = Report::new(context, &self.settings, &self.elements, &self.emitters, &self.links, &self.outcomes)?;
+        self.report = Report { device_elements, ..report };
         let mut recorder = context.recorder("explicit-visibility")?;
         self.trace_emitters(&mut recorder, stage);
         self.trace_lights(&mut recorder, stage);
@@ -358,6 +372,11 @@ impl ExplicitVisibility {
 
     pub fn elements(&self) -> &Elements {
         &self.elements
+    }
+
+    /// The further devices that make links.
+    pub fn helpers(&self) -> &[Helper] {
+        &self.helpers
     }
 
     pub fn links(&self) -> &Links {
