@@ -240,7 +240,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.trace.json")]
     pub trace: Option<PathBuf>,
     /// Write a RenderDoc capture of the last frame
-    #[arg(long, value_name = "FILE.rdc")]
+    #[arg(long, value_name = "FILE.rdc", conflicts_with = "link_gpu")]
     pub capture: Option<PathBuf>,
     /// ... or of this one, counted from 1
     #[arg(long, value_name = "N", requires = "capture", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -277,7 +277,7 @@ pub struct ViewArgs {
     #[arg(long)]
     pub bare: bool,
     /// Write a RenderDoc capture of the first picture in full quality, made once more when all is prepared
-    #[arg(long, value_name = "FILE.rdc")]
+    #[arg(long, value_name = "FILE.rdc", conflicts_with = "link_gpu")]
     pub capture: Option<PathBuf>,
     /// ... or of this picture, counted from 1, with everything that was made for it
     #[arg(long, value_name = "N", requires = "capture", value_parser = clap::value_parser!(u32).range(1..=100_000))]

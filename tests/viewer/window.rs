@@ -57,12 +57,12 @@ pub struct View<'s> {
 
 impl<'s> View<'s> {
     pub fn open(screen: &'s Screen, folder: &Path, options: &str) -> Self {
-        Self::open_with(screen, folder, options, &[])
+        Self::open_with(screen, folder, &format!("--validate {options}"), &[])
     }
 
     pub fn open_with(screen: &'s Screen, folder: &Path, options: &str, environment: &[(&str, String)]) -> Self {
         let program = Command::new(env!("CARGO_BIN_EXE_linklight"))
-            .args(["view", "--validate", "--shots"])
+            .args(["view", "--shots"])
             .arg(folder)
             .args(options.split_whitespace())
             .env("DISPLAY", &screen.name)

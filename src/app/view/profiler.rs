@@ -59,7 +59,9 @@ impl Profiler {
     pub fn take(&mut self, records: Vec<PassRecord>) {
         let (own, others): (Vec<_>, Vec<_>) =
             records.into_iter().partition(|record| record.path.starts_with("window/"));
-        self.window_ms = own.iter().map(milliseconds).sum();
+        if !own.is_empty() {
+            self.window_ms = own.iter().map(milliseconds).sum();
+        }
         let room = MOST_RECORDS.saturating_sub(self.pending.len());
         self.pending.extend(others.into_iter().take(room));
     }

@@ -80,7 +80,8 @@ pub struct Viewer {
     pub(super) corner: [u32; 2],
     shots: PathBuf,
     last_tick: Instant,
-    frame_count: u64,
+    /// Of the window.
+    pub frame_count: u64,
     /// Display and settings of methods that were left.
     left: HashMap<&'static str, (Option<Display>, Vec<Assignment>)>,
 }
@@ -217,10 +218,8 @@ impl Viewer {
         }
     }
 
-    /// A frame of the window was drawn.
     pub fn take_records(&mut self, records: Vec<PassRecord>) {
         self.profiler.take(records);
-        self.frame_count += 1;
     }
 
     /// The last films, to be shown as the options say now.

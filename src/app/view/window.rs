@@ -90,6 +90,8 @@ impl<'c> ViewWindow<'c> {
         if (open.frame.width, open.frame.height) != (width, height) {
             open.frame = frame_image(self.context, width, height)?;
         }
+        // What a picture cost is there before the picture is.
+        self.viewer.take_records(self.context.take_records());
         self.viewer.take_news(self.desk)?;
         if let Some(shaders) = &self.shaders {
             self.viewer.take_reloads(&shaders.poll(self.context));
@@ -122,7 +124,7 @@ impl<'c> ViewWindow<'c> {
         }
         open.window.pre_present_notify();
         open.presenter.present(self.context, recorder, &open.frame)?;
-        self.viewer.take_records(self.context.take_records());
+        self.viewer.frame_count += 1;
 
         let title = self.viewer.title();
         if title != open.title {
