@@ -148,6 +148,8 @@ pub struct Links {
     pub words: LinkWords,
     pub element_count: u32,
     pub link_count: u32,
+    /// Windows were made for more links than there were.
+    has_room: bool,
 }
 
 impl Links {
@@ -177,6 +179,7 @@ impl Links {
             },
             element_count: counts.receivers,
             link_count: 0,
+            has_room: false,
         })
     }
 
@@ -291,8 +294,13 @@ impl LinkBuilder {
     /// Hands the links over in place of `links`, whose memory the next ones are built in.
     pub fn swap(&mut self, links: &mut Links) {
         std::mem::swap(&mut self.links, links);
+        if self.links.has_room {
+            self.links.empty();
+        } else {
+            // The next would soon need more than there is.
+            self.links.clear();
+        }
         self.is_again = true;
-        self.links.empty();
     }
 
     /// As [`Self::swap`], where there are no links yet.
@@ -303,6 +311,7 @@ impl LinkBuilder {
         };
         let mut links = Links::new(context, format, self.counts)?;
         std::mem::swap(&mut self.links, &mut links);
+        self.is_again = true;
         Ok(links)
     }
 
@@ -359,6 +368,7 @@ impl LinkBuilder {
 
         let held = links.size_bytes();
         let (link_base, row_capacity) = (links.link_count, 3 * counts.rays);
+        links.has_room = *is_again;
         let capacity = |link_bytes| {
             let budget = budget.saturating_sub(held).min(context.available_bytes());
             let wanted = window_capacity(context, counts, &batch, total, link_base, link_bytes, (held, budget))?;

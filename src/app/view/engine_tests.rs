@@ -159,8 +159,12 @@ fn frames_with_everything_moving_allocate_nothing() {
     for (method, frames, warm_up) in [
         ("path-tracing", frames, 3),
         ("implicit-visibility --set bins=4", frames.div_ceil(8), 3),
-        // Two sets of links, each in some frames, and room for more of them than before.
-        ("explicit-visibility --set rays_per_element=16 --set link_budget=4000", frames, 14),
+        // Two sets of links, each made in two frames, and then with room for more than before.
+        (
+            "explicit-visibility --set rays_per_element=16 --set link_budget=60000",
+            if frames > 60 { frames } else { 18 },
+            9,
+        ),
     ] {
         let mut engine = Engine::new(&context);
         let (mut made, mut held) = ((0, 0), 0);
