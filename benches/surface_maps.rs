@@ -186,7 +186,8 @@ fn queries(
     });
 }
 
-/// Bounces over texels and the gather of a picture, by maps and by rays.
+/// Bounces over texels and the gather of a picture, by maps and by rays, beside the paper's Table 1 in all: a frame of texels
+/// against one of pixels, two bounces against one.
 fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh: &Bvh, pose: &Pose) {
     let solve = |bounces| {
         seconds(context, 2, |recorder| {
@@ -196,11 +197,17 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
     let [direct, one, two] = [0, 1, 2].map(solve);
     let cuts = context.download(method.cut_sizes()).unwrap();
     let nodes = cuts.iter().map(|&cut| f64::from(cut)).sum::<f64>();
+    let texels = f64::from(method.texels.count);
     println!(
-        "  {} texels: direct {direct:.3} s, 1 bounce {one:.3} s, 2 bounces {two:.3} s; {:.2} M nodes/s, cut {:.0}",
-        method.texels.count,
+        "  {texels} texels: direct {direct:.3} s, 1 bounce {one:.3} s, 2 bounces {two:.3} s; {:.2} M nodes gathered/s, cut {:.0}",
         nodes / (two - one) / 1e6,
-        nodes / f64::from(method.texels.count)
+        nodes / texels
+    );
+    println!(
+        "  texels/s with 1 bounce {:.1} k, with 2 {:.1} k: {:.2} : 1",
+        texels / one / 1e3,
+        texels / two / 1e3,
+        two / one
     );
     let shadow_maps = ShadowMaps::new(context, pose).unwrap();
     let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
@@ -209,8 +216,11 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
     let mut recorder = context.recorder("bench").unwrap();
     shadow_maps.draw(&mut recorder, stage.world, pose, stage.bounds);
     recorder.submit().unwrap();
-    for gather_visibility in [Visibility::Maps, Visibility::Checked, Visibility::Rays, Visibility::None] {
-        let settings = final_gather::Settings { gather_visibility, ..final_gather::Settings::default() };
+    let all = [Visibility::Maps, Visibility::Checked, Visibility::Rays, Visibility::None];
+    for (gather_visibility, gather_chance) in
+        all.into_iter().flat_map(|by| [(by, 0.0), (by, 0.5), (by, 1.0), (by, 2.0)])
+    {
+        let settings = final_gather::Settings { gather_visibility, gather_chance, ..final_gather::Settings::default() };
         let display = FinalGather::new(context, SIZE.to_array(), settings, ToneSettings::default(), 0).unwrap();
         let from = Gathered {
             world: stage.world,
@@ -225,11 +235,16 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
         let sample = Sample { index: 0, samples: 1, is_unlit: false };
         let time = seconds(context, 3, |recorder| display.draw(recorder, from, sample, &film));
         let report = display.report(context).unwrap();
+        let pixels = report.pixels as f64;
         println!(
-            "  {SIZE} pixels by {gather_visibility:?}: {time:.3} s, {:.1} k pixels/s, {:.2} M nodes gathered/s, cut {:.0}, {:.1} rays",
-            report.pixels as f64 / time / 1e3,
-            report.pixels as f64 * report.mean_cut / time / 1e6,
+            "  {SIZE} pixels by {gather_visibility:?}, chance {gather_chance}: {time:.3} s, {:.1} k pixels/s; with the texels' frame, 1 \
+             bounce {:.1} k, 2 bounces {:.1} k; {:.2} M nodes gathered/s, cut {:.0} of {:.0} visited, {:.1} rays",
+            pixels / time / 1e3,
+            pixels / (time + direct) / 1e3,
+            pixels / (time + one) / 1e3,
+            pixels * report.mean_cut / time / 1e6,
             report.mean_cut,
+            report.mean_visited,
             report.mean_rays
         );
     }

@@ -1,6 +1,6 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/brdf.glsl"
+#include "display/seen.glsl"
 #include "lib/environment.glsl"
 #include "lib/light.glsl"
 #include "lib/shadow.glsl"
@@ -9,15 +9,6 @@
 // what is seen there. The stage adds all other light.
 // reads the G-buffer, triangles, positions, lights, shadow maps, the environment
 // updates direct, indirect, albedo, normal, depth [pixel_count]   shared none
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
-layout(set = 0, binding = 1) uniform sampler2D g_position;
-layout(set = 0, binding = 2) uniform sampler2D g_normal;
-layout(set = 0, binding = 3) uniform sampler2D g_albedo;
-layout(set = 0, binding = 4) uniform sampler2D g_specular;
-layout(set = 0, binding = 5) uniform sampler2D g_emission;
-layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer ShadowViews { ShadowView shadow_views[]; };
@@ -114,43 +105,33 @@ void add(uint index, vec3 direct_value, vec3 albedo_value, vec3 normal_value, fl
 
 void main()
 {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = textureSize(visible_triangles, 0);
-    if (any(greaterThanEqual(pixel, size))) return;
-    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
-    uint seen = texelFetch(visible_triangles, pixel, 0).x;
-    if (seen == 0) {
+    ivec2 pixel;
+    uint index;
+    if (!is_in_picture(pixel, index)) return;
+    Seen seen;
+    if (!is_seen(pixel, params.eye, seen)) {
         // The background: along the ray through the pixel.
-        vec2 ndc = (vec2(pixel) + 0.5) * 2.0 / vec2(size) - 1.0;
+        vec2 ndc = (vec2(pixel) + 0.5) * 2.0 / vec2(textureSize(visible_triangles, 0)) - 1.0;
         vec4 near = inverse(params.clip_from_world) * vec4(ndc, 1.0, 1.0);
         vec3 direction = params.eye.w == 0.0 ? params.forward : normalize(near.xyz / near.w - params.eye.xyz);
         add(index, environment_radiance(environment_info[0], direction), vec3(0.0), vec3(0.0), 0.0);
         return;
     }
 
-    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
-    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
-    vec4 emitted = texelFetch(g_emission, pixel, 0);
-    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
-    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, emitted.rgb, n.xyz, emitted.w > 0.5);
-
+    Surface s = seen.surface;
     vec3 direct_sum = params.is_unlit != 0 ? vec3(0.0) : s.emission;
     if (s.reflects && params.is_unlit == 0) {
-        uvec3 v = triangles[seen - 1];
-        vec3 geometric = normalize(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]));
-        if (dot(geometric, to_eye) < 0.0) geometric = -geometric;
-
         for (uint light = 0; light < params.light_count; ++light) {
             vec3 to_light;
             float distance_to_light;
-            vec3 arriving = light_irradiance(lights[light], position.xyz, to_light, distance_to_light);
+            vec3 arriving = light_irradiance(lights[light], seen.position, to_light, distance_to_light);
             float cosine = dot(s.normal, to_light);
-            if (cosine <= 0.0 || dot(geometric, to_light) <= 0.0 || arriving == vec3(0.0)) continue;
-            float lit = lit_share(light, position.xyz, geometric, s.normal, to_light, distance_to_light);
-            if (lit > 0.0) direct_sum += brdf_value(s, to_eye, to_light) * arriving * (cosine * lit);
+            if (cosine <= 0.0 || dot(seen.geometric, to_light) <= 0.0 || arriving == vec3(0.0)) continue;
+            float lit = lit_share(light, seen.position, seen.geometric, s.normal, to_light, distance_to_light);
+            if (lit > 0.0) direct_sum += brdf_value(s, seen.to_eye, to_light) * arriving * (cosine * lit);
         }
     }
-    float along = dot(position.xyz, params.forward) - params.eye_along;
-    float distance_to_eye = params.eye.w == 0.0 ? along : distance(position.xyz, params.eye.xyz);
+    float along = dot(seen.position, params.forward) - params.eye_along;
+    float distance_to_eye = params.eye.w == 0.0 ? along : distance(seen.position, params.eye.xyz);
     add(index, direct_sum, s.albedo, s.normal, distance_to_eye);
 }

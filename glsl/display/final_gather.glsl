@@ -31,8 +31,8 @@ layout(set = 0, binding = 11) uniform sampler2D g_specular;
 layout(set = 0, binding = 12) uniform sampler2D g_emission;
 layout(set = 0, binding = 13) uniform usamplerBuffer sender_nodes;      // SENDER_NODE_TEXELS each; compact: one
 layout(set = 0, binding = 14) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
-layout(set = 0, binding = 15, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
-layout(set = 0, binding = 16, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
+layout(set = 0, binding = 15) uniform usamplerBuffer sender_leaves;     // SENDER_LEAF_TEXELS each
+layout(set = 0, binding = 16) uniform usamplerBuffer sender_branches;   // one each
 layout(set = 0, binding = 17, scalar) readonly buffer Adaptation { float adaptation[]; };
 layout(set = 0, binding = 18, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 19, scalar) readonly buffer EnvironmentInfos { EnvironmentInfo environment_info[]; };
@@ -57,6 +57,7 @@ layout(push_constant, scalar) uniform Params {
     float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
     uint jitter;
     uint environment_samples;
+    float chance_below;         // of the threshold
     float map_reach;            // checked maps are not asked of senders nearer than so many of their radii
 } params;
 
@@ -68,8 +69,8 @@ uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
 EnvironmentCell environment_cell(uint index) { return environment_cells[index]; }
 
-SenderLeaf sender_shape(uint slot) { return leaves[slot]; }
-LeafLight sender_leaf_light(uint slot) { return leaf_light[slot]; }
+uvec4 sender_leaf_texel(uint i) { return texelFetch(sender_leaves, int(i)); }
+uvec4 sender_branch_texel(uint i) { return texelFetch(sender_branches, int(i)); }
 
 // One of the environment's directions.
 Arrival environment_arrival(uvec4 random, float share)
@@ -118,7 +119,7 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
     vec3 origin = position.xyz + slack * geometric;
 
     float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
-    options = GatherOptions(params.threshold, scale, params.white, params.operator, params.clamp_radii, params.jitter != 0, params.sample_index);
+    options = GatherOptions(params.threshold, scale, params.white, params.operator, params.clamp_radii, params.jitter != 0, params.sample_index, params.chance_below);
     // What the pixel shows before this gather: the mean of its samples so far, this one's direct light included.
     float samples_so_far = params.weight * float(params.sample_index + 1);
     start_showing(luminance(direct[index] + indirect[index]) / samples_so_far);
@@ -134,9 +135,9 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
             uint taken = next_sender(node, params.node_count, visited);
             if (taken == NO_SENDER) break;
             ++cut;
-            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)));
-            found = arrival.direct + arrival.indirect + arrival.lost != vec3(0.0);
-            float free;
+            float chance, free;
+            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)), chance);
+            found = is_worth_asking(arrival, chance);
             if (found && is_told(origin, arrival.target, arrival.leaf, free)) {
                 take(arrival, free);
                 found = false;

@@ -25,7 +25,6 @@ uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
 uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
 uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
-vec3 surface_map_origin(uint place) { return map_origins[place]; }
 
 #include "display/final_gather.glsl"
 
@@ -43,7 +42,10 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
         return is_far && is_sure;
     }
     vec2 at = place_on_leaf(shape, target);
-    free = sender_maps_visibility(map_frame[0], place, leaf_neighbours[leaf], at, origin, receiver.geometric);
+    SenderPlaces asked = sender_places(map_frame[0], place, leaf_neighbours[leaf], at, origin);
+    free = 0.0;
+    for (uint k = 0; k < asked.count; ++k)
+        free += asked.weight[k] * surface_map_visibility(map_frame[0], asked.place[k], map_origins[asked.place[k]], origin, receiver.geometric);
     return true;
 }
 

@@ -4,6 +4,7 @@
 #include "lib/bvh.glsl"
 #include "lib/sender_gather.glsl"
 #include "lib/rigid_objects.glsl"
+#include "lib/sender_maps.glsl"
 #include "trace/holes.glsl"
 
 // One thread per pixel: gathers from the sender tree, seeing by the maps of objects that move; by our own traversal what
@@ -20,6 +21,7 @@ layout(set = 0, binding = 27, scalar) readonly buffer MapOrigins { vec3 map_orig
 layout(set = 0, binding = 28, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 layout(set = 0, binding = 30, scalar) readonly buffer RigidWords { uint rigid_words[]; };
 layout(set = 0, binding = 31, scalar) readonly buffer RigidObjects { RigidObject rigid_objects[]; };
+layout(set = 0, binding = 32, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -46,9 +48,13 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     bool is_near = CHECKED && dot(d, d) < params.map_reach * params.map_reach * radius_squared;
     free = 0.0;
     if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || is_near) return false;
-    uint place = leaf_places[leaf], own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
-    RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, place, map_origins[place]);
-    free = rigid_visibility(map_frame[0], sender, RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]));
+    uint own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
+    RigidPoint own = RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], place_on_leaf(shape, target), origin);
+    for (uint k = 0; k < asked.count; ++k) {
+        RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, asked.place[k], map_origins[asked.place[k]]);
+        free += asked.weight[k] * rigid_visibility(map_frame[0], sender, own);
+    }
     return true;
 }
 

@@ -1,6 +1,6 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/brdf.glsl"
+#include "display/seen.glsl"
 #include "lib/cluster_basis.glsl"
 #include "lib/leaf_light.glsl"
 
@@ -9,15 +9,6 @@
 // reads the G-buffer, triangles, positions, normals, leaves, triangle_leaves, direct_irradiance and
 //       indirect_irradiance (per leaf and function), neighbours (rows of leaves), colors (per leaf)
 // updates direct, indirect [pixel_count]   shared none
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
-layout(set = 0, binding = 1) uniform sampler2D g_position;
-layout(set = 0, binding = 2) uniform sampler2D g_normal;
-layout(set = 0, binding = 3) uniform sampler2D g_albedo;
-layout(set = 0, binding = 4) uniform sampler2D g_specular;
-layout(set = 0, binding = 5) uniform sampler2D g_emission;
-layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Normals { vec3 normals[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Leaves { LeafElement leaves[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer TriangleLeaves { uvec2 triangle_leaves[]; };
@@ -76,41 +67,34 @@ void shade(Surface s, uint leaf, vec3 point, out vec3 direct_radiance, out vec3 
 
 void main()
 {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = textureSize(visible_triangles, 0);
-    if (any(greaterThanEqual(pixel, size))) return;
-    uint seen = texelFetch(visible_triangles, pixel, 0).x;
-    vec4 emitted = texelFetch(g_emission, pixel, 0);
-    if (seen == 0 || (emitted.w <= 0.5 && params.shows_colors == 0)) return;
+    ivec2 pixel;
+    uint index;
+    if (!is_in_picture(pixel, index)) return;
+    Seen seen;
+    if (!is_seen(pixel, params.eye, seen) || (!seen.surface.reflects && params.shows_colors == 0)) return;
 
-    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
-    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
-    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
-    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, max(n.w, params.least_alpha), emitted.rgb, n.xyz, true);
-
-    uvec3 v = triangles[seen - 1];
-    bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), to_eye) < 0.0;
-    uvec2 sides = triangle_leaves[seen - 1];
-    uint leaf = is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
+    uvec2 sides = triangle_leaves[seen.triangle];
+    uint leaf = seen.is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
     if (leaf == NO_FACE_ELEMENT) return;
 
-    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
+    Surface s = seen.surface;
+    s.alpha = max(s.alpha, params.least_alpha);
     if (params.shows_colors != 0) {
         direct[index] += params.weight * colors[leaf];
         return;
     }
     vec3 direct_sum, indirect_sum;
     if (params.per_vertex == 0) {
-        shade(s, leaf, position.xyz, direct_sum, indirect_sum);
+        shade(s, leaf, seen.position, direct_sum, indirect_sum);
     } else {
         direct_sum = indirect_sum = vec3(0.0);
-        vec3 w = vec3(1.0 - position.w - specular.w, position.w, specular.w);
         for (uint k = 0; k < 3; ++k) {
-            s.normal = is_back ? -normals[v[k]] : normals[v[k]];
+            uint vertex = seen.vertices[k];
+            s.normal = seen.is_back ? -normals[vertex] : normals[vertex];
             vec3 d, i;
-            shade(s, leaf, positions[v[k]], d, i);
-            direct_sum += w[k] * d;
-            indirect_sum += w[k] * i;
+            shade(s, leaf, positions[vertex], d, i);
+            direct_sum += seen.weights[k] * d;
+            indirect_sum += seen.weights[k] * i;
         }
     }
     direct[index] += params.weight * direct_sum;

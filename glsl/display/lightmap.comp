@@ -1,6 +1,6 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/brdf.glsl"
+#include "display/seen.glsl"
 #include "lib/specular_albedo.glsl"
 #include "lib/atlas.glsl"
 
@@ -9,15 +9,6 @@
 // reads the G-buffer, triangles, positions, corner_places[2 * triangle_count], texel_at[resolution^2],
 //       texel_charts, direct_irradiance, indirect_irradiance [texel_count] (W/m2)
 // updates direct, indirect [pixel_count]   shared none
-layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
-layout(set = 0, binding = 1) uniform sampler2D g_position;
-layout(set = 0, binding = 2) uniform sampler2D g_normal;
-layout(set = 0, binding = 3) uniform sampler2D g_albedo;
-layout(set = 0, binding = 4) uniform sampler2D g_specular;
-layout(set = 0, binding = 5) uniform sampler2D g_emission;
-layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer CornerPlaces { TriangleCorners corner_places[]; };    // fronts, then backs
 layout(set = 0, binding = 9, scalar) readonly buffer TexelAt { uint texel_at[]; };          // NO_TEXEL where there is none
 layout(set = 0, binding = 10, scalar) readonly buffer TexelCharts { uint texel_charts[]; };
@@ -39,22 +30,15 @@ vec4 cubic_weights(float t)
 
 void main()
 {
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = textureSize(visible_triangles, 0);
-    if (any(greaterThanEqual(pixel, size))) return;
-    uint seen = texelFetch(visible_triangles, pixel, 0).x;
-    vec4 emitted = texelFetch(g_emission, pixel, 0);
-    if (seen == 0 || emitted.w <= 0.5) return;
+    ivec2 pixel;
+    uint index;
+    if (!is_in_picture(pixel, index)) return;
+    Seen seen;
+    if (!is_seen(pixel, params.eye, seen) || !seen.surface.reflects) return;
 
-    vec4 position = texelFetch(g_position, pixel, 0), n = texelFetch(g_normal, pixel, 0);
-    vec4 diffuse = texelFetch(g_albedo, pixel, 0), specular = texelFetch(g_specular, pixel, 0);
-    vec3 to_eye = params.eye.w == 0.0 ? params.eye.xyz : normalize(params.eye.xyz - position.xyz);
-    Surface s = Surface(diffuse.rgb, specular.rgb, diffuse.w, n.w, emitted.rgb, n.xyz, true);
-    uvec3 v = triangles[seen - 1];
-    vec3 across = cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]);
-    uint side = dot(across, to_eye) < 0.0 ? params.triangle_count : 0u;
-    TriangleCorners corners = corner_places[side + seen - 1];
-    vec2 place = (1.0 - position.w - specular.w) * corners.a + position.w * corners.b + specular.w * corners.c;
+    TriangleCorners corners = corner_places[seen.triangle + (seen.is_back ? params.triangle_count : 0u)];
+    vec3 w = seen.weights;
+    vec2 place = w.x * corners.a + w.y * corners.b + w.z * corners.c;
 
     // The texel under the place says which chart counts; at a border rounding may step beside it.
     ivec2 last = ivec2(int(params.resolution) - 1);
@@ -76,15 +60,15 @@ void main()
             if (any(lessThan(at, ivec2(0))) || any(greaterThan(at, last))) continue;
             uint texel = texel_at[at.y * int(params.resolution) + at.x];
             if (texel == NO_TEXEL || texel_charts[texel] != chart) continue;
-            float w = wx[x] * wy[y];
-            direct_sum += w * direct_irradiance[texel];
-            indirect_sum += w * indirect_irradiance[texel];
-            weight_sum += w;
+            float weight = wx[x] * wy[y];
+            direct_sum += weight * direct_irradiance[texel];
+            indirect_sum += weight * indirect_irradiance[texel];
+            weight_sum += weight;
         }
     }
     if (weight_sum <= 0.0) return;
-    vec3 reflectance = params.weight / weight_sum * (s.albedo + specular_albedo(s, dot(s.normal, to_eye))) / PI;
-    uint index = uint(pixel.y) * uint(size.x) + uint(pixel.x);
+    Surface s = seen.surface;
+    vec3 reflectance = params.weight / weight_sum * (s.albedo + specular_albedo(s, dot(s.normal, seen.to_eye))) / PI;
     direct[index] += reflectance * direct_sum;
     indirect[index] += reflectance * indirect_sum;
 }

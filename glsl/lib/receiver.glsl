@@ -56,8 +56,7 @@ float largest_radiance(SenderNode node, Receiver r)
     float squared = dot(to_node, to_node);
     float distance_to_node = sqrt(squared);
     float nearest = distance_to_node - node.radius;
-    float power = max(node.power.r, max(node.power.g, node.power.b));
-    if (power <= 0.0) return 0.0;
+    if (node.power <= 0.0) return 0.0;
     if (nearest <= 1e-4 * distance_to_node) return 1e38;
 
     vec3 to_light = to_node / distance_to_node;
@@ -71,6 +70,6 @@ float largest_radiance(SenderNode node, Receiver r)
 
     vec3 albedo = r.surface.albedo;
     float reflected = max(albedo.r, max(albedo.g, albedo.b)) / PI * cos_receiver + largest_specular(r, to_light, cos_spread);
-    return power / PI * cos_sender * reflected / (nearest * nearest);
+    return node.power / PI * cos_sender * reflected / (nearest * nearest);
 }
 #endif

@@ -1,18 +1,13 @@
 #ifndef LIB_SENDER_GATHER
 #define LIB_SENDER_GATHER
 // What a receiver takes from the nodes of its cut: the oracle of the walk, and the light of a node by one of its leaves.
-//
-// Bridges, beside the tables of lib/sender_tree.glsl:
-//     SenderLeaf sender_shape(uint slot)
-//     LeafLight sender_leaf_light(uint slot)
+// The kernel binds the tables of lib/sender_tree.glsl and lib/sender_leaf.glsl.
 #include "lib/polygon.glsl"
 #include "lib/random.glsl"
 #include "lib/receiver.glsl"
+#include "lib/sender_leaf.glsl"
 #include "lib/sender_walk.glsl"
 #include "lib/tone_curve.glsl"
-
-SenderLeaf sender_shape(uint slot);
-LeafLight sender_leaf_light(uint slot);
 
 struct GatherOptions {
     float threshold;            // of what the display shows, 0..1
@@ -22,6 +17,7 @@ struct GatherOptions {
     float clamp_radii;          // senders stand at least so many of their radii away; 0: they are measured exactly
     bool jitter;
     uint sample_index;
+    float chance_below;         // of the threshold: what would change the picture by less is asked by chance; 0: never
 };
 GatherOptions options;
 
@@ -70,19 +66,38 @@ struct Arrival {
     uint leaf;
 };
 
-// The light of a node of the cut, by a leaf that is drawn from it, or by its representative.
-Arrival arrival_of(uint node, uvec4 random)
+// Drops an arrival that would hardly show with a chance, `u` in 0..1 deciding, and lets the others of its kind stand for it:
+// a ray costs the same whatever it brings. Right in the mean.                                              [Arvo1990]
+// Differs from [Ritschel2008]: there the visibility of every node of the cut is asked.
+bool is_worth_asking(inout Arrival arrival, float u)
+{
+    vec3 light = arrival.direct + arrival.indirect;
+    if (light + arrival.lost == vec3(0.0)) return false;
+    float change = shown_value(shown_luminance + luminance(light)) - shown;
+    float full = options.chance_below * options.threshold;
+    if (change >= full) return true;
+    float chance = max(change / full, 0.01);
+    if (u >= chance) return false;
+    arrival.direct /= chance;
+    arrival.indirect /= chance;
+    arrival.lost /= chance;
+    return true;
+}
+
+// The light of a node of the cut, by a leaf that is drawn from it, or by its representative; `chance` is left over.
+Arrival arrival_of(uint node, uvec4 random, out float chance)
 {
     vec4 u = vec4(0.5);
-    if (options.jitter) u = fract(unit_interval(random) + float(options.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.0));
+    if (options.jitter) u = fract(unit_interval(random) + float(options.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.3247180));
+    chance = u.w;
     uint slot;
     vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
     if (options.jitter) {
         float probability;
-        slot = sender_leaf(draw_leaf(node, u.z, probability));
-        float by = 1.0 / probability;
-        emitted = by * sender_leaf_light(slot).emitted;
-        reflected = by * sender_leaf_light(slot).reflected;
+        slot = draw_leaf(node, u.z, probability);
+        LeafLight light = sender_leaf_light(slot);
+        emitted = light.emitted / probability;
+        reflected = light.reflected / probability;
     } else {
         slot = sender_leaf(node);
         float area = leaf_area(sender_shape(slot));
@@ -126,7 +141,7 @@ Arrival arrival_of(uint node, uvec4 random)
 
     vec3 reflectance = brdf_value(receiver.surface, receiver.to_eye, to_target / sqrt(squared));
     vec3 lost = (exact - form_factor) * reflectance * (emitted + reflected);
-        vec3 size = abs(target);
+    vec3 size = abs(target);
     // Ends before the leaf's own surface.
     target += max(size.x, max(size.y, size.z)) * (1.0 / 524288.0) * sender_normal;
     return Arrival(form_factor * reflectance * emitted, form_factor * reflectance * reflected, lost, target, slot);

@@ -1,14 +1,9 @@
 #ifndef LIB_SENDER_MAPS
 #define LIB_SENDER_MAPS
-// Whether a point of a sender's texel sees another point, by the maps of that texel and of those beside it: percentage-
-// closer filtering over senders.                                                                [Ritschel2008 3.2.2]
-//
-// Bridges, beside those of lib/surface_map.glsl:
-//     vec3 surface_map_origin(uint place)      where the map of a place stands, metres
+// By which maps a point of a sender's texel sees: that of the texel, and those of the texels beside it. Percentage-closer
+// filtering over senders.                                                                       [Ritschel2008 3.2.2]
 #include "lib/sender_tree.glsl"
 #include "lib/surface_map.glsl"
-
-vec3 surface_map_origin(uint place);
 
 // Where a point of the leaf lies on it, -1/2..1/2 along either side.
 vec2 place_on_leaf(SenderLeaf leaf, vec3 point)
@@ -19,9 +14,16 @@ vec2 place_on_leaf(SenderLeaf leaf, vec3 point)
     return clamp(vec2(dot(cross(offset, leaf.edge_v), across), dot(cross(leaf.edge_u, offset), across)) / squared, vec2(-0.5), vec2(0.5));
 }
 
+// Places of the maps that are asked, and what each answer counts; the weights add up to one.
+struct SenderPlaces {
+    uint count;
+    uvec3 place;
+    vec3 weight;
+};
+
 // `around` are the places of the texels towards +u, -u, +v and -v, its own where there is none. At a texel's border it
-// counts as much as its neighbour.
-float sender_maps_visibility(SurfaceMapFrame frame, uint place, uvec4 around, vec2 at, vec3 point, vec3 normal)
+// counts as much as its neighbour. `point` is what is seen: it tells the chances.
+SenderPlaces sender_places(SurfaceMapFrame frame, uint place, uvec4 around, vec2 at, vec3 point)
 {
     vec2 share = abs(at);
     uint beside_u = at.x >= 0.0 ? around.x : around.y, beside_v = at.y >= 0.0 ? around.z : around.w;
@@ -30,16 +32,10 @@ float sender_maps_visibility(SurfaceMapFrame frame, uint place, uvec4 around, ve
         if (chance.x < share.x) place = beside_u;
         else if (chance.y < share.y) place = beside_v;
     }
-    float own = surface_map_visibility(frame, place, surface_map_origin(place), point, normal);
-    if (frame.sender_filter != 2) return own;
     // As often as the drawn one: along u first.
-    vec2 weights = vec2(share.x, (1.0 - share.x) * share.y);
-    float sum = (1.0 - weights.x - weights.y) * own;
-    for (uint k = 0; k < 2; ++k) {
-        uint beside = k == 0 ? beside_u : beside_v;
-        if (beside == place) sum += weights[k] * own;
-        else sum += weights[k] * surface_map_visibility(frame, beside, surface_map_origin(beside), point, normal);
-    }
-    return sum;
+    float along_v = (1.0 - share.x) * share.y;
+    if (frame.sender_filter == 2)
+        return SenderPlaces(3, uvec3(place, beside_u, beside_v), vec3(1.0 - share.x - along_v, share.x, along_v));
+    return SenderPlaces(1, uvec3(place), vec3(1.0, 0.0, 0.0));
 }
 #endif

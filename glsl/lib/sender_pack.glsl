@@ -30,19 +30,6 @@ vec3 unpack_power(uint word, float largest)
     return scale * vec3(word & 63u, word >> 6 & 63u, word >> 12 & 63u);
 }
 
-uint sender_skip(uint i)
-{
-    return sender_is_compact() ? sender_node_texel(i).w & 0xffffu : sender_node_texel(SENDER_NODE_TEXELS * i + 2).y;
-}
-
-// Of the channels the power of a node has in all, W.
-float sender_weight(uint i)
-{
-    if (!sender_is_compact()) return uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * i).w);
-    vec3 power = unpack_power(sender_node_texel(i).z, sender_frame().largest_power);
-    return power.r + power.g + power.b;
-}
-
 // Of a node's power what it emits itself, W.
 vec3 sender_emitted_power(uint i) { return uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * i + 1).xyz); }
 
@@ -50,6 +37,16 @@ vec3 sender_emitted_power(uint i) { return uintBitsToFloat(sender_light_texel(SE
 uint sender_leaf(uint i)
 {
     return sender_is_compact() ? sender_node_texel(i).w >> 16 : sender_light_texel(SENDER_LIGHT_TEXELS * i + 1).w;
+}
+
+// Unit, of two signed coordinates on the octahedron that is folded into a square.                            [Meyer2010]
+vec3 unpack_axis(uint word)
+{
+    vec2 v = unpackSnorm2x16(word);
+    vec3 n = vec3(v, 1.0 - abs(v.x) - abs(v.y));
+    float below = max(-n.z, 0.0);
+    n.xy += mix(vec2(below), vec2(-below), greaterThanEqual(n.xy, vec2(0.0)));
+    return n / sqrt(dot(n, n));
 }
 
 SenderNode unpack_node(uvec4 texel, SenderFrame frame)
@@ -61,17 +58,16 @@ SenderNode unpack_node(uvec4 texel, SenderFrame frame)
     node.axis = axis / sqrt(max(dot(axis, axis), 1e-12));
     node.cos_cone = float(texel.y >> 24) / 127.0 - 1.0;
     node.skip = texel.w & 0xffffu;
-    node.power = unpack_power(texel.z, frame.largest_power);
+    vec3 power = unpack_power(texel.z, frame.largest_power);
+    node.power = max(power.r, max(power.g, power.b));
     return node;
 }
 
 SenderNode sender_node(uint i)
 {
     if (sender_is_compact()) return unpack_node(sender_node_texel(i), sender_frame());
-    uvec4 sphere = sender_node_texel(SENDER_NODE_TEXELS * i);
-    uvec4 cone = sender_node_texel(SENDER_NODE_TEXELS * i + 1);
-    uvec4 light = sender_light_texel(SENDER_LIGHT_TEXELS * i);
-    return SenderNode(uintBitsToFloat(sphere.xyz), uintBitsToFloat(sphere.w), uintBitsToFloat(cone.xyz),
-                      uintBitsToFloat(cone.w), sender_skip(i), uintBitsToFloat(light.xyz));
+    uvec4 sphere = sender_node_texel(SENDER_NODE_TEXELS * i), rest = sender_node_texel(SENDER_NODE_TEXELS * i + 1);
+    return SenderNode(uintBitsToFloat(sphere.xyz), uintBitsToFloat(sphere.w), unpack_axis(rest.x), uintBitsToFloat(rest.y),
+                      rest.w, uintBitsToFloat(rest.z));
 }
 #endif

@@ -4,9 +4,10 @@
 // inner node i is i + 1; `skip` is the node after its subtree, so a walk needs no stack.            [Ritschel2008 4.2]
 // Leaves are flat: triangles or parallelograms, seen from the side that their normal points to.
 //
-// Bridge of what reads nodes: the kernel binds two tables of texels.
-//     uvec4 sender_node_texel(uint i)       SENDER_NODE_TEXELS each (compact: one, see below)
+// Bridge of what reads nodes: the kernel binds tables of texels, since one fetch brings four words.
+//     uvec4 sender_node_texel(uint i)       SENDER_NODE_TEXELS each (compact: one, see lib/sender_pack.glsl)
 //     uvec4 sender_light_texel(uint i)      SENDER_LIGHT_TEXELS each
+//     uvec4 sender_branch_texel(uint i)     one each
 #include "lib/hemisphere.glsl"
 
 struct SenderLeaf {
@@ -29,7 +30,7 @@ struct SenderNode {
     vec3 axis;          // unit: all normals lie within a cone about it
     float cos_cone;     // of the cone's half angle; -1 where they point everywhere
     uint skip;
-    vec3 power;         // that leaves it, W; radiant intensity along the normal is power / pi
+    float power;        // that leaves it in its brightest channel, W; radiant intensity along the normal is power / pi
 };
 
 // What compact nodes are quantised in.
@@ -42,9 +43,10 @@ struct SenderFrame {
 
 const uint NO_SENDER = 0xffffffffu;
 
-// Texels of a node: centre | radius; axis | cos_cone; area, skip, first leaf, 0. Of its light: power and its sum over
-// channels; the part of the power that is emitted, and the leaf that represents the node.
-const uint SENDER_NODE_TEXELS = 3;
+// Texels of a node: centre | radius; axis (octahedral, 16 bits a coordinate), cos_cone, power of the brightest channel,
+// skip. Of its light: power; the part of it that is emitted, and the leaf that represents the node. Of its branch: the right
+// child, and the left one's share of the power; of a leaf: NO_SENDER, and its index.
+const uint SENDER_NODE_TEXELS = 2;
 const uint SENDER_LIGHT_TEXELS = 2;
 
 float leaf_area(SenderLeaf leaf)

@@ -4,6 +4,7 @@
 //
 // Bridges, beside the tables of lib/sender_tree.glsl:
 //     uint sender_decision(SenderNode node, bool is_leaf)      what to do with the node
+//     uvec4 sender_branch_texel(uint i)
 #include "lib/sender_pack.glsl"
 
 const uint SENDER_IGNORE = 0u;  // it sends nothing here: go on behind its subtree
@@ -11,6 +12,7 @@ const uint SENDER_TAKE = 1u;    // good enough: it belongs to the cut
 const uint SENDER_REFINE = 2u;  // look at its children; a leaf is taken
 
 uint sender_decision(SenderNode node, bool is_leaf);
+uvec4 sender_branch_texel(uint i);
 
 // The next node of the cut at or after `node`, or NO_SENDER; moves `node` behind it. Ends for any table: every step
 // goes to a larger index.
@@ -33,18 +35,16 @@ uint next_sender(inout uint node, uint node_count, inout uint visited)
 uint draw_leaf(uint node, inout float u, out float probability)
 {
     probability = 1.0;
-    uint skip = sender_skip(node);
-    while (skip != node + 1) {
-        uint right = sender_skip(node + 1);
-        float left_power = sender_weight(node + 1), power = left_power + sender_weight(right);
-        float share = power > 0.0 ? left_power / power : 0.5;
+    uvec4 branch = sender_branch_texel(node);
+    while (branch.x != NO_SENDER) {
+        float share = uintBitsToFloat(branch.y);
         bool goes_left = u < share;
         float taken = goes_left ? share : 1.0 - share;
         u = min((goes_left ? u : u - share) / taken, 0.99999994);
         probability *= taken;
-        node = goes_left ? node + 1 : right;
-        skip = goes_left ? right : sender_skip(node);
+        node = goes_left ? node + 1 : branch.x;
+        branch = sender_branch_texel(node);
     }
-    return node;
+    return branch.y;
 }
 #endif

@@ -33,7 +33,7 @@ void main()
     Surface surface = Surface(c.albedo, c.f0, c.f90, c.alpha, vec3(0.0), c.normal, true);
     Receiver receiver = Receiver(vec3(0.0), c.normal, c.to_eye, surface);
     vec3 normal = leaf_normal(c.leaf);
-    results[i].bound = largest_radiance(SenderNode(c.leaf.centre, c.radius, normal, 1.0, 1, vec3(PI)), receiver);
+    results[i].bound = largest_radiance(SenderNode(c.leaf.centre, c.radius, normal, 1.0, 1, PI), receiver);
 
     float largest = 0.0;
     for (uint k = 0; k < params.point_count; ++k) {

@@ -22,7 +22,7 @@ void main()
     if (i >= params.node_count) return;
 
     // No node has more than the root.
-    vec3 all = sender_node(0).power;
+    vec3 all = uintBitsToFloat(sender_light_texel(0).xyz);
     float largest_power = max(all.r, max(all.g, all.b));
     if (i == 0) tree_frame[0].largest_power = largest_power;
 
@@ -42,6 +42,6 @@ void main()
     uint area_code = 0;     // the walk needs none: leaves have their own
     compact_nodes[i] = uvec4(place.x | place.y << 8 | place.z << 16 | radius_code << 24,
                              axis.x | axis.y << 8 | axis.z << 16 | cone_code << 24,
-                             pack_power(node.power, largest_power) | area_code << 24,
+                             pack_power(uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * i).xyz), largest_power) | area_code << 24,
                              node.skip | sender_leaf(i) << 16);
 }

@@ -28,8 +28,8 @@ use crate::stages::world::World;
 use bytemuck::Zeroable as _;
 use glam::{UVec2, Vec3};
 
-/// Of [`KeptSender::leaf`]: the environment. The same constant stands in `lib/sender_tree.glsl`.
-pub const NO_SENDER: u32 = u32::MAX;
+/// Of [`KeptSender::leaf`]: the environment.
+pub use crate::stages::sender_tree::NO_SENDER;
 
 crate::choice! {
     /// What decides whether a sender is seen.
@@ -63,6 +63,9 @@ crate::settings! {
     pub struct Settings {
         /// A node is opened where its light, gone wrong, would change what is shown by more than this.
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
+        /// Senders that would change what is shown by less than this share of the threshold are asked by chance, and count
+        /// for those that are not; needs jitter.
+        gather_chance: f32 = 0.5, range 0.0..=100.0, unit "of gather_threshold", paper "not done";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Checked maps are not asked of senders nearer than so many of their radii, rays are.
@@ -226,8 +229,8 @@ impl FinalGather {
                     g_emission: g_buffer.sampled(&g_buffer.emission),
                     sender_nodes: nodes,
                     sender_light: &tree.light,
-                    leaves: &tree.leaves,
-                    leaf_light: &tree.leaf_light,
+                    sender_leaves: &tree.leaves,
+                    sender_branches: &tree.branches,
                     adaptation: &tree.adaptation,
                     tree_frame: &tree.frame,
                     positions: &world.positions,
@@ -251,6 +254,7 @@ impl FinalGather {
                         clamp_radii: settings.gather_clamp,
                         jitter: u32::from(settings.gather_jitter),
                         environment_samples: if environment.info.is_black != 0 { 0 } else { settings.environment_samples },
+                        chance_below: if settings.gather_jitter { settings.gather_chance } else { 0.0 },
                         map_reach: settings.gather_map_reach,
                     },
                     constants: $constants,
@@ -276,7 +280,7 @@ impl FinalGather {
             return;
         }
         match (from.tracer, from.maps.filter(|_| by_maps)) {
-            (_, Some(PlacedMaps { maps, leaf_places, frame, moving: Some(moving), .. })) => gather!(
+            (_, Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: Some(moving), .. })) => gather!(
                 FinalGatherMoving,
                 FinalGatherMovingParams,
                 surfaces,
@@ -288,6 +292,7 @@ impl FinalGather {
                 runs: &maps.runs,
                 map_origins: &maps.origins,
                 leaf_places: leaf_places,
+                leaf_neighbours: leaf_neighbours,
                 rigid_words: &moving.words,
                 rigid_objects: &moving.present
             ),

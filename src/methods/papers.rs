@@ -90,6 +90,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1016/0020-0190(79)90072-3"),
     },
     Paper {
+        key: "Arvo1990",
+        title: "Particle Transport and Image Synthesis",
+        authors: "James Arvo, David Kirk",
+        year: 1990,
+        venue: "Computer Graphics 24(4), SIGGRAPH",
+        doi: Some("10.1145/97879.97886"),
+    },
+    Paper {
         key: "Arvo1995",
         title: "Analytic Methods for Simulated Light Transport",
         authors: "James Arvo",
@@ -253,6 +261,14 @@ pub const PAPERS: &[Paper] = &[
         year: 1947,
         venue: "The Annals of Mathematical Statistics 18(1)",
         doi: Some("10.1214/aoms/1177730491"),
+    },
+    Paper {
+        key: "Meyer2010",
+        title: "On Floating-Point Normal Vectors",
+        authors: "Quirin Meyer, Jochen S\u{fc}\u{df}muth, Gerd Su\u{df}ner, Marc Stamminger, G\u{fc}nther Greiner",
+        year: 2010,
+        venue: "Computer Graphics Forum 29(4), Eurographics Symposium on Rendering",
+        doi: Some("10.1111/j.1467-8659.2010.01737.x"),
     },
     Paper {
         key: "Moller1997",

@@ -51,6 +51,7 @@ fn error(fixture: &Fixture, gather: &Gather, reflected: &[Vec3]) -> f64 {
 
 const ALL_SEEN: Settings = Settings {
     gather_threshold: 0.0,
+    gather_chance: 0.0,
     gather_visibility: Visibility::None,
     gather_map_reach: 0.0,
     gather_jitter: false,
@@ -98,32 +99,62 @@ fn errors_and_cuts_follow_the_threshold() {
     }
 }
 
-/// Drawing leaves by chance is right in the mean, whatever the threshold.
+/// Drawing leaves by chance, and asking small ones by chance, is right in the mean, whatever the threshold.
 #[test]
-fn drawn_leaves_are_right_in_the_mean() {
+fn what_is_drawn_is_right_in_the_mean() {
     let context = TestContext::new();
     let (mut fixture, emitted, reflected) = corner_fixture(&context);
-    let settings = Settings { gather_threshold: 0.3, gather_jitter: true, ..ALL_SEEN };
-    let mut mean: Option<Gather> = None;
-    let mut errors = Vec::new();
-    for seed in 0..16 {
-        fixture.seed = seed;
-        let gather = fixture.gather(&context, settings, &emitted, &reflected, 1);
-        let so_far = match mean.take() {
-            None => gather,
-            Some(mut so_far) => {
-                for (sum, value) in so_far.indirect.iter_mut().zip(&gather.indirect) {
-                    *sum += (value - *sum) / (seed + 1) as f32;
+    let mut first_errors = Vec::new();
+    for gather_chance in [0.0, 2.0] {
+        let settings = Settings { gather_threshold: 0.3, gather_jitter: true, gather_chance, ..ALL_SEEN };
+        let mut mean: Option<Gather> = None;
+        let mut errors = Vec::new();
+        for seed in 0..16 {
+            fixture.seed = seed;
+            let gather = fixture.gather(&context, settings, &emitted, &reflected, 1);
+            let so_far = match mean.take() {
+                None => gather,
+                Some(mut so_far) => {
+                    for (sum, value) in so_far.indirect.iter_mut().zip(&gather.indirect) {
+                        *sum += (value - *sum) / (seed + 1) as f32;
+                    }
+                    so_far
                 }
-                so_far
-            }
-        };
-        errors.push(error(&fixture, &so_far, &reflected));
-        mean = Some(so_far);
+            };
+            errors.push(error(&fixture, &so_far, &reflected));
+            mean = Some(so_far);
+        }
+        println!("chance {gather_chance}: errors of the mean of 1 .. 16 pictures: {errors:.4?}");
+        // A quarter, give or take.
+        assert!(errors[15] < 0.35 * errors[0], "{errors:?}");
+        first_errors.push(errors[0]);
     }
-    println!("errors of the mean of 1 .. 16 pictures: {errors:.4?}");
-    // A quarter, give or take.
-    assert!(errors[15] < 0.35 * errors[0], "{errors:?}");
+    assert!(first_errors[1] > 1.1 * first_errors[0], "nothing was asked by chance: {first_errors:?}");
+}
+
+/// Chance spares rays: fewer are cast for a little more noise, and the light in the mean is the same.
+#[test]
+fn chance_spares_rays() {
+    let context = TestContext::new();
+    let (fixture, emitted, reflected) = corner_fixture(&context);
+    let run = |gather_chance| {
+        let settings = Settings {
+            gather_threshold: 0.05,
+            gather_jitter: true,
+            gather_visibility: Visibility::Rays,
+            gather_chance,
+            ..ALL_SEEN
+        };
+        let gather = fixture.gather(&context, settings, &emitted, &reflected, 4);
+        let off = error(&fixture, &gather, &reflected);
+        println!("chance {gather_chance}: off by {off:.4}; {}", gather.report);
+        let light = gather.indirect.iter().map(|v| v.as_dvec3().element_sum()).sum::<f64>();
+        (gather.report, light, off)
+    };
+    let [(all, light, off), (some, some_light, some_off)] = [0.0, 1.0].map(run);
+    assert!(some.mean_rays < 0.6 * all.mean_rays && some.mean_rays > 1.0, "{some}");
+    assert!((some_light / light - 1.0).abs() < 0.005, "{some_light} for {light}");
+    assert!(some_off < 3.0 * off, "{some_off} for {off}");
 }
 
 /// The paper's 16 bytes a node: bounds are rounded outwards, so cuts grow a little; the sum over all leaves is the same, and

@@ -5,6 +5,7 @@ mod bound;
 mod common;
 mod fixture;
 mod gather;
+mod methods;
 mod pack;
 mod tree;
 mod twins;

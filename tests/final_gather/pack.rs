@@ -25,6 +25,14 @@ struct Wide {
     leaf: u32,
 }
 
+/// Twin of `unpack_axis`.
+fn unpack_axis(word: u32) -> Vec3 {
+    let [x, y] = [word as i16, (word >> 16) as i16].map(|c| (f32::from(c) / 32_767.0).max(-1.0));
+    let z = 1.0 - x.abs() - y.abs();
+    let [x, y] = [x, y].map(|c| if c >= 0.0 { c - (-z).max(0.0) } else { c + (-z).max(0.0) });
+    Vec3::new(x, y, z).normalize()
+}
+
 fn pack_power(power: Vec3, largest: f32) -> u32 {
     let brightest = power.max_element();
     if brightest <= 0.0 {
@@ -90,17 +98,27 @@ fn compact_nodes_are_those_of_a_plain_loop_and_hold_the_wide_ones() {
         |texel: [u32; 4]| Vec3::new(f32::from_bits(texel[0]), f32::from_bits(texel[1]), f32::from_bits(texel[2]));
     let (nodes, light) =
         (context.download(wide.nodes().0.buffer()).unwrap(), context.download(wide.light.buffer()).unwrap());
-    let wide: Vec<Wide> = (nodes.chunks(3).zip(light.chunks(2)))
+    let wide: Vec<Wide> = (nodes.chunks(2).zip(light.chunks(2)))
         .map(|(node, light)| Wide {
             centre: vec3(node[0]),
             radius: f32::from_bits(node[0][3]),
-            axis: vec3(node[1]),
-            cos_cone: f32::from_bits(node[1][3]),
-            skip: node[2][1],
+            axis: unpack_axis(node[1][0]),
+            cos_cone: f32::from_bits(node[1][1]),
+            skip: node[1][3],
             power: vec3(light[0]),
             leaf: light[1][3],
         })
         .collect();
+    // The walk's own copy of the power, and axes that stand for those of the topology.
+    for ((node, texels), exact) in wide.iter().zip(nodes.chunks(2)).zip(&compact.topology.nodes) {
+        assert_eq!(f32::from_bits(texels[1][2]), node.power.max_element());
+        assert!(
+            node.axis.distance(exact.axis) < 1e-4 && node.cos_cone <= exact.cos_cone,
+            "{} {}",
+            node.axis,
+            exact.axis
+        );
+    }
     let frame = context.download(&compact.frame).unwrap()[0];
     let frame = Frame {
         low: frame.low,

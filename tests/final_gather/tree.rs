@@ -60,7 +60,7 @@ fn powers_add_up_and_representatives_are_the_heaviest() {
                 }
                 let right = tree.topology.nodes[node + 1].skip as usize;
                 let weight = |child: usize| match representative {
-                    Representative::Intensity => f32::from_bits(light[2 * child][3]),
+                    Representative::Intensity => float(light[2 * child]).element_sum(),
                     Representative::Area => tree.topology.nodes[child].area,
                 };
                 let heavier = if weight(node + 1) >= weight(right) { node + 1 } else { right };
@@ -151,9 +151,7 @@ fn triangles_send_the_mean_of_the_elements_at_their_corners() {
         let mut recorder = context.recorder("test").unwrap();
         leaves.fill(&mut recorder, elements, has_reflected);
         recorder.submit().unwrap();
-        for (light, owner) in
-            context.download(&leaves.tree.leaf_light).unwrap().iter().zip(&leaves.tree.topology.leaf_order)
-        {
+        for (light, owner) in leaves.tree.leaf_light(&context).unwrap().iter().zip(&leaves.tree.topology.leaf_order) {
             let (emitted, reflected) = twin(*owner as usize);
             let reflected = if has_reflected { reflected } else { Vec3::ZERO };
             assert!(light.emitted.distance(emitted) <= 1e-5 * emitted.length(), "leaf {owner}: {light:?}");

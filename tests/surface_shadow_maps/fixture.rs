@@ -1,16 +1,22 @@
 //! A scene on the device, ready for the method.
 
 use crate::common::TestContext;
-use glam::Vec3;
+use glam::{UVec2, Vec3};
+use linklight::display::direct::Sample;
+use linklight::display::final_gather::{self, FinalGather, GatherReport, Gathered};
+use linklight::display::g_buffer::GBuffer;
+use linklight::display::shadow_maps::ShadowMaps;
 use linklight::gpu::Context;
 use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps};
 use linklight::report::tonemap::ToneSettings;
 use linklight::scene::atlas::Atlas;
+use linklight::scene::camera::View;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
 use linklight::scene::{LoadOptions, Scene, builtin, deform};
 use linklight::stages::bvh::Bvh;
+use linklight::stages::film::Film;
 use linklight::stages::surface_maps::{MapInput, MapOptions, Sequence};
 use linklight::stages::trace::Tracer;
 use linklight::stages::work::{Unwatched, Watch};
@@ -26,6 +32,22 @@ pub struct Fixture {
     pub bounds: [Vec3; 2],
     pub world: World,
     pub bvh: Bvh,
+}
+
+/// What the final gather shows of a solution.
+pub struct Shown {
+    pub direct: Vec<Vec3>,
+    pub indirect: Vec<Vec3>,
+    pub report: GatherReport,
+}
+
+impl Shown {
+    /// How far its indirect light is from another's, as a share of that: root of the mean square.
+    pub fn off(&self, other: &Self) -> f32 {
+        let total: f32 = other.indirect.iter().map(|e| e.length_squared()).sum();
+        let error: f32 = self.indirect.iter().zip(&other.indirect).map(|(a, b)| a.distance_squared(*b)).sum();
+        (error / total).sqrt()
+    }
 }
 
 pub fn builtin_scene(name: &str) -> Scene {
@@ -87,6 +109,40 @@ impl Fixture {
         let lit = Lit { world: &self.world, tracer: self.tracer(), bvh: &self.bvh };
         method.solve(&mut recorder, lit, bounces);
         recorder.submit().unwrap();
+    }
+
+    /// One sample of each pixel of a picture, gathered from the method's solution.
+    pub fn show(
+        &self,
+        context: &Context,
+        method: &SurfaceShadowMaps,
+        settings: final_gather::Settings,
+        size: UVec2,
+    ) -> Shown {
+        let shadow_maps = ShadowMaps::new(context, &self.pose).unwrap();
+        let g_buffer = GBuffer::new(context, size.x, size.y).unwrap();
+        let film = Film::new(context, size.x, size.y).unwrap();
+        let view = View::of_scene(&self.scene, &self.pose, None, Some(self.bounds), size).unwrap();
+        let display = FinalGather::new(context, size.to_array(), settings, ToneSettings::default(), 0).unwrap();
+        let from = Gathered {
+            world: &self.world,
+            tree: &method.tree,
+            tracer: self.tracer(),
+            maps: method.maps.as_ref(),
+            bvh: &self.bvh,
+            shadow_maps: &shadow_maps,
+            g_buffer: &g_buffer,
+            view: &view,
+        };
+        let mut recorder = context.recorder("test").unwrap();
+        shadow_maps.draw(&mut recorder, &self.world, &self.pose, self.bounds);
+        display.draw(&mut recorder, from, Sample { index: 0, samples: 1, is_unlit: false }, &film);
+        recorder.submit().unwrap();
+        Shown {
+            direct: context.download(&film.direct).unwrap(),
+            indirect: context.download(&film.indirect).unwrap(),
+            report: display.report(context).unwrap(),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Surface shadow maps: compressed maps against uncompressed ones, the cache, the solution on the atlas.
 
+mod checked;
 #[path = "../common/mod.rs"]
 mod common;
 mod fixture;
@@ -9,3 +10,5 @@ mod maps;
 mod moving;
 mod outside;
 mod solve;
+#[path = "../final_gather/twins.rs"]
+mod twins;

@@ -41,48 +41,97 @@ fn every_compressed_depth_answers_like_the_uncompressed_map() {
     }
 }
 
-/// On the device: points on the near side of the first surface are seen, those on the far side of the second are not.
+/// Points just before and just behind what a pixel of a map at a place may hold, seen and not.
+struct Asked {
+    queries: Vec<SurfaceMapQuery>,
+    expected: Vec<f32>,
+}
+
+impl Asked {
+    /// Of the pixels at places that `choose` gives.
+    fn new(
+        context: &TestContext,
+        maps: &SurfaceMaps,
+        intervals: &[Interval],
+        choose: impl Iterator<Item = (u32, u32)>,
+    ) -> Self {
+        let origins = context.download(&maps.origins).unwrap();
+        let mut asked = Self { queries: Vec::new(), expected: Vec::new() };
+        for (place, pixel) in choose {
+            let interval = intervals[place as usize * maps.maps.pixel_count() + pixel as usize];
+            if interval == Interval::ANY {
+                continue;
+            }
+            let direction = direction(pixel, maps.options.resolution);
+            // Codes at the ends of the interval, moved by more than rounding.
+            for (is_seen, code) in [(1.0, f32::from(interval.low) - 0.5), (0.0, f32::from(interval.high) + 1.5)] {
+                if (20.0..=65_000.0).contains(&code) {
+                    let point = origins[place as usize] + direction * (code / maps.codes_per_metre);
+                    asked.queries.push(SurfaceMapQuery { point, normal: direction, place });
+                    asked.expected.push(is_seen);
+                }
+            }
+        }
+        assert!(asked.expected.iter().filter(|&&seen| seen == 0.0).count() * 20 > asked.expected.len());
+        asked
+    }
+
+    /// How many answers of the device are not what is expected.
+    fn wrong(&self, context: &TestContext, maps: &SurfaceMaps, filter: MapFilter) -> usize {
+        let buffer = context.upload("test/queries", &self.queries).unwrap();
+        let visibility = context.buffer("test/visibility", self.queries.len()).unwrap();
+        let mut recorder = context.recorder("test").unwrap();
+        maps.query(&mut recorder, &buffer, &visibility, self.queries.len(), filter);
+        recorder.submit().unwrap();
+        let got = context.download(&visibility).unwrap();
+        let wrong = got.iter().zip(&self.expected).filter(|(got, expected)| (**got - **expected).abs() > 1e-3).count();
+        println!("filter {filter:?}: {wrong} of {} answers differ", self.queries.len());
+        wrong
+    }
+}
+
+/// On the device: points on the near side of the first surface are seen, those on the far side of the second are not;
+/// through every pixel of every map of a small scene.
 #[test]
 fn queries_on_the_device_agree_with_the_intervals() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
     let atlas = fixture.atlas(32);
-    let resolution = 16;
+    let options = options(8, Sequence::Spiral);
     let order = sequence::walk(&atlas, Sequence::Spiral);
     let input = fixture.map_input(&atlas, None);
-    let mut maps = SurfaceMaps::new(&context, input, options(resolution, Sequence::Spiral), &Unwatched).unwrap();
-    let intervals = uncompressed(&context, input, options(resolution, Sequence::Spiral), &order, &Unwatched).unwrap();
-    let origins = context.download(&maps.origins).unwrap();
-    let random = &mut Random(17);
-    let (mut queries, mut expected) = (Vec::new(), Vec::new());
-    while queries.len() < 20_000 {
-        let place = random.below(order.len() as u32);
-        let pixel = random.below(maps.maps.pixel_count() as u32);
-        let interval = intervals[place as usize * maps.maps.pixel_count() + pixel as usize];
-        let is_seen = random.below(2) == 0;
-        // Codes at the ends of the interval, moved by more than rounding.
-        let code = if is_seen { f32::from(interval.low) - 0.5 } else { f32::from(interval.high) + 1.5 };
-        if interval == Interval::ANY || !(20.0..=65_000.0).contains(&code) {
-            continue;
-        }
-        let point = origins[place as usize] + direction(pixel, resolution) * (code / maps.codes_per_metre);
-        queries.push(SurfaceMapQuery { point, normal: direction(pixel, resolution), place });
-        expected.push(f32::from(u8::from(is_seen)));
-    }
-    assert!(expected.iter().filter(|&&seen| seen == 0.0).count() > 1000);
-    let buffer = context.upload("test/queries", &queries).unwrap();
-    let visibility = context.buffer("test/visibility", queries.len()).unwrap();
+    let mut maps = SurfaceMaps::new(&context, input, options, &Unwatched).unwrap();
+    let intervals = uncompressed(&context, input, options, &order, &Unwatched).unwrap();
+    let pixels = maps.maps.pixel_count() as u32;
+    let all = (0..order.len() as u32).flat_map(|place| (0..pixels).map(move |pixel| (place, pixel)));
+    let asked = Asked::new(&context, &maps, &intervals, all);
     for (filter, block_bits) in [(MapFilter::None, 16), (MapFilter::Four, 16), (MapFilter::None, 8)] {
         maps.repack(&context, block_bits).unwrap();
-        let mut recorder = context.recorder("test").unwrap();
-        maps.query(&mut recorder, &buffer, &visibility, queries.len(), filter);
-        recorder.submit().unwrap();
-        let got = context.download(&visibility).unwrap();
-        let wrong = got.iter().zip(&expected).filter(|(got, expected)| (**got - **expected).abs() > 1e-3).count();
-        println!("filter {filter:?}: {wrong} of {} answers differ", queries.len());
         // At the middle of a pixel no other counts.
-        assert!(wrong == 0, "{wrong} wrong answers");
+        assert_eq!(asked.wrong(&context, &maps, filter), 0);
     }
+    let mut spoilt = asked;
+    spoilt.queries.iter_mut().for_each(|query| query.place = (query.place + 40) % order.len() as u32);
+    assert!(spoilt.wrong(&context, &maps, MapFilter::None) > 1000, "another texel's answers would go unnoticed");
+}
+
+/// The same of a scene with many charts, sampled.
+#[test]
+fn queries_of_a_large_scene_agree_with_the_intervals() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("maze"), &Environment::default());
+    let atlas = fixture.atlas(128);
+    let options = options(6, Sequence::Spiral);
+    let order = sequence::walk(&atlas, Sequence::Spiral);
+    let input = fixture.map_input(&atlas, None);
+    let maps = SurfaceMaps::new(&context, input, options, &Unwatched).unwrap();
+    let intervals = uncompressed(&context, input, options, &order, &Unwatched).unwrap();
+    assert!(order.len() > 5000 && first_wrong(&maps, &intervals).is_none());
+    let random = &mut Random(17);
+    let pixels = maps.maps.pixel_count() as u32;
+    let some = std::iter::repeat_with(|| (random.below(order.len() as u32), random.below(pixels)));
+    let asked = Asked::new(&context, &maps, &intervals, some.take(40_000));
+    assert_eq!(asked.wrong(&context, &maps, MapFilter::None), 0);
 }
 
 /// Drawn filtering is the filter over all four pixels in the mean.

@@ -4,18 +4,13 @@ use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::Fixture;
 use glam::{Quat, UVec2, Vec3};
-use linklight::display::direct::Sample;
-use linklight::display::final_gather::{self, FinalGather, Gathered, Visibility};
-use linklight::display::g_buffer::GBuffer;
-use linklight::display::shadow_maps::ShadowMaps;
+use linklight::display::final_gather::{self, Visibility};
 use linklight::gpu::shaders::types::Ray;
 use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps, TexelVisibility};
-use linklight::report::tonemap::ToneSettings;
-use linklight::scene::camera::View;
 use linklight::scene::environment::Environment;
 use linklight::scene::pose::Pose;
 use linklight::scene::{Channel, Clip, Interpolation, LightKind, Material, Mesh, Node, Primitive, Scene, Track};
-use linklight::stages::film::Film;
+use linklight::stages::surface_maps::MapFilter;
 use linklight::stages::trace;
 use linklight::stages::work::Unwatched;
 
@@ -157,25 +152,40 @@ fn a_sliding_box_and_a_turning_bar_are_seen_as_rays_see_them() {
 #[test]
 fn a_bounce_among_moving_objects_is_that_of_rays() {
     let context = TestContext::new();
-    let mut by_maps = posed(&context, 0.0).prepare(&context, Settings { threshold: 0.0, ..settings() });
-    for seconds in [1.0, 2.0] {
+    let prepare = |sender_filter| {
+        posed(&context, 0.0).prepare(&context, Settings { threshold: 0.0, sender_filter, ..settings() })
+    };
+    let check = |by_maps: &mut SurfaceShadowMaps, seconds| -> Vec<Vec3> {
         let fixture = posed(&context, seconds);
         by_maps.place(&context, &fixture.stage(None, &Unwatched)).unwrap();
         let solve = |method: &SurfaceShadowMaps| -> Vec<Vec3> {
             fixture.solve(&context, method, 1);
             context.download(method.indirect_irradiance()).unwrap()
         };
-        let maps = solve(&by_maps);
+        let maps = solve(by_maps);
         // Along rays, over the same texels: what stands in for the maps is all that differs.
         let placed = by_maps.maps.take();
-        let rays = solve(&by_maps);
+        let rays = solve(by_maps);
         by_maps.maps = placed;
         let error: f32 = maps.iter().zip(&rays).map(|(a, b)| a.distance_squared(*b)).sum();
         let total: f32 = rays.iter().map(|e| e.length_squared()).sum();
         let energy = maps.iter().sum::<Vec3>().x / rays.iter().sum::<Vec3>().x;
         println!("{seconds} s: a bounce off by {:.2} %, energy {energy:.4}", 100.0 * (error / total).sqrt());
         assert!((error / total).sqrt() < 0.1 && (energy - 1.0).abs() < 0.02);
-    }
+        maps
+    };
+    let mut drawn = prepare(MapFilter::Drawn);
+    let of_drawn = check(&mut drawn, 1.0);
+    check(&mut drawn, 2.0);
+    // Maps of the texels beside a sender's count too, and in the mean as often when they are drawn.
+    let [of_one, of_four] = [MapFilter::None, MapFilter::Four].map(|filter| check(&mut prepare(filter), 1.0));
+    let apart = |a: &[Vec3], b: &[Vec3]| -> f32 { a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum() };
+    println!(
+        "all four apart from one map: {}, from drawn ones: {}",
+        apart(&of_four, &of_one),
+        apart(&of_four, &of_drawn)
+    );
+    assert!(apart(&of_four, &of_drawn) > 0.0 && apart(&of_four, &of_one) > 0.0);
 }
 
 #[test]
@@ -198,33 +208,17 @@ fn a_picture_of_moving_objects_is_that_of_rays() {
     let fixture = posed(&context, 1.0);
     method.place(&context, &fixture.stage(None, &Unwatched)).unwrap();
     fixture.solve(&context, &method, 0);
-    let size = UVec2::new(64, 40);
-    let shadow_maps = ShadowMaps::new(&context, &fixture.pose).unwrap();
-    let g_buffer = GBuffer::new(&context, size.x, size.y).unwrap();
-    let film = Film::new(&context, size.x, size.y).unwrap();
-    let view = View::of_scene(&fixture.scene, &fixture.pose, None, Some(fixture.bounds), size).unwrap();
-    let draw = |gather_visibility| -> Vec<Vec3> {
+    let show = |gather_visibility| {
         let settings = final_gather::Settings { gather_visibility, gather_threshold: 0.0, ..Default::default() };
-        let display = FinalGather::new(&context, size.to_array(), settings, ToneSettings::default(), 0).unwrap();
-        let from = Gathered {
-            world: &fixture.world,
-            tree: &method.tree,
-            tracer: fixture.tracer(),
-            maps: method.maps.as_ref(),
-            bvh: &fixture.bvh,
-            shadow_maps: &shadow_maps,
-            g_buffer: &g_buffer,
-            view: &view,
-        };
-        let mut recorder = context.recorder("test").unwrap();
-        shadow_maps.draw(&mut recorder, &fixture.world, &fixture.pose, fixture.bounds);
-        display.draw(&mut recorder, from, Sample { index: 0, samples: 1, is_unlit: false }, &film);
-        recorder.submit().unwrap();
-        context.download(&film.indirect).unwrap()
+        fixture.show(&context, &method, settings, UVec2::new(64, 40))
     };
-    let [maps, rays, none] = [Visibility::Maps, Visibility::Rays, Visibility::None].map(draw);
-    let total: f32 = rays.iter().map(|e| e.length_squared()).sum();
-    let off = |a: &[Vec3]| (a.iter().zip(&rays).map(|(a, b)| a.distance_squared(*b)).sum::<f32>() / total).sqrt();
-    println!("a picture by maps is off by {:.2} %, without shadows by {:.2} %", 100.0 * off(&maps), 100.0 * off(&none));
-    assert!(off(&maps) < 0.05 && off(&none) > 2.0 * off(&maps));
+    let rays = show(Visibility::Rays);
+    let [maps, checked, none] = [Visibility::Maps, Visibility::Checked, Visibility::None].map(|by| show(by).off(&rays));
+    println!(
+        "a picture by maps is off by {:.2} %, checked by {:.2} %, without shadows by {:.2} %",
+        100.0 * maps,
+        100.0 * checked,
+        100.0 * none
+    );
+    assert!(maps < 0.05 && checked < maps && none > 2.0 * maps);
 }

@@ -3,11 +3,13 @@
 use crate::common::TestContext;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
-use glam::Vec3;
+use crate::twins;
+use glam::{DVec3, Vec3};
 use linklight::methods::pick::Pick;
 use linklight::methods::surface_shadow_maps::{Settings, Shown, TexelVisibility};
 use linklight::scene::environment::Environment;
 use linklight::scene::{LightKind, Material};
+use linklight::stages::{sender_tree, texels};
 use std::f32::consts::PI;
 
 const SMALL: Settings = Settings {
@@ -20,6 +22,7 @@ const SMALL: Settings = Settings {
     visibility: TexelVisibility::Rays,
     threshold: 0.02,
     jitter: true,
+    chance: 0.0,
     light_samples: 8,
     environment_rays: 64,
     tree_layout: linklight::stages::sender_tree::NodeLayout::Wide,
@@ -62,42 +65,102 @@ fn the_furnace_gains_half_of_each_bounce() {
     }
 }
 
-/// A point light over a plane: I cos / r^2, mean over each texel.                                    [common ground]
+/// Every kind of light over a plane: irradiance of each texel by its closed form, and whether it counts as direct light of
+/// the atlas or, punctual, apart from it.                                                            [common ground]
 #[test]
-fn a_point_light_falls_with_the_square_of_the_distance() {
+fn every_kind_of_light_arrives_as_its_closed_form_says() {
     let context = TestContext::new();
-    let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
     let at = Vec3::new(0.5, 1.5, -0.25);
-    let lamp = (light(LightKind::Point, 7.0), at, Vec3::NEG_Y);
-    let scene = scene(vec![one_sided(0.5)], vec![plane], &[lamp]);
-    let fixture = Fixture::new(&context, scene, &Environment::default());
-    let method = fixture.prepare(&context, Settings { light_samples: 32, ..SMALL });
-    fixture.solve(&context, &method, 0);
-    let found = context.download(method.last_irradiance()).unwrap();
-    for (texel, irradiance) in method.atlas.texels.iter().zip(&found) {
-        let offset = at - texel.position;
-        let expected = 7.0 * offset.y / offset.length().powi(3);
-        assert!((irradiance.x / expected - 1.0).abs() < 0.01, "{:?}: {irradiance} for {expected}", texel.position);
+    let point = |position: Vec3| 7.0 * (at - position).y / (at - position).length().powi(3);
+    let (inner_angle, outer_angle) = (0.3f32, 0.5f32);
+    let spot = |position: Vec3| {
+        let cosine = (at - position).normalize().y;
+        let cone = (cosine - outer_angle.cos()) / (inner_angle.cos() - outer_angle.cos());
+        point(position) * cone.clamp(0.0, 1.0).powi(2)
+    };
+    let slanted = Vec3::new(0.6, -0.8, 0.0);
+    // A panel of radiance 2 that faces down.
+    let panel = parallelogram(at, Vec3::X * 1.2, Vec3::Z * 0.8, 1, 1);
+    let panel_leaf = sender_tree::parallelogram(at + Vec3::new(0.6, 0.0, 0.4), Vec3::X * 1.2, Vec3::Z * 0.8);
+    let area = |position: Vec3| 2.0 * PI * twins::form_factor(position.as_dvec3(), DVec3::Y, &panel_leaf) as f32;
+    let sky = Environment::Constant(Vec3::splat(0.5));
+    let black = Environment::default();
+    let lamp = |kind, intensity, direction| vec![(light(kind, intensity), at, direction)];
+    let spot_kind = LightKind::Spot { inner_angle, outer_angle };
+    type Expected<'a> = &'a dyn Fn(Vec3) -> f32;
+    let cases: [(&str, Vec<_>, bool, &Environment, Expected<'_>, f32); 5] = [
+        ("point", lamp(LightKind::Point, 7.0, Vec3::NEG_Y), false, &black, &point, 0.01),
+        // A texel that the cone's border crosses is sampled at 32 points.
+        ("spot", lamp(spot_kind, 7.0, Vec3::NEG_Y), false, &black, &spot, 0.06),
+        ("directional", lamp(LightKind::Directional, 3.0, slanted), false, &black, &|_| 3.0 * 0.8, 1e-4),
+        ("area", vec![], true, &black, &area, 0.01),
+        ("environment", vec![], false, &sky, &|_| 0.5 * PI, 1e-4),
+    ];
+    for (name, lights, has_panel, environment, expected, tolerance) in cases {
+        let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
+        let emitter = Material { emission: Vec3::splat(2.0), ..one_sided(0.0) };
+        let is_punctual = !lights.is_empty();
+        let surfaces = if has_panel { vec![plane, panel.clone()] } else { vec![plane] };
+        let fixture = Fixture::new(&context, scene(vec![one_sided(0.5), emitter], surfaces, &lights), environment);
+        let settings = Settings { light_samples: 32, threshold: 0.0, jitter: false, ..SMALL };
+        let method = fixture.prepare(&context, settings);
+        fixture.solve(&context, &method, 0);
+        let found = context.download(method.last_irradiance()).unwrap();
+        let direct = context.download(method.direct_irradiance()).unwrap();
+        let floor = || method.atlas.texels.iter().zip(&found).filter(|(texel, _)| texel.position.y < 1.0);
+        let off = |expected: Expected<'_>| {
+            let largest = floor().map(|(texel, _)| expected(texel.position)).fold(0.0, f32::max);
+            floor().map(|(t, e)| (e.x - expected(t.position)).abs()).fold(0.0, f32::max) / largest
+        };
+        println!("{name}: off by {:.2e} of the brightest texel", off(expected));
+        assert!(floor().count() > 500 && off(expected) < tolerance, "{name}: {}", off(expected));
+        assert!(off(&|position| 1.1 * expected(position)) > tolerance, "{name}: a tenth more would go unnoticed");
+        // What display adds per pixel is not in the atlas' own direct light.
+        assert_eq!(direct.iter().all(|e| *e == Vec3::ZERO), is_punctual, "{name}");
     }
-    assert!(
-        context.download(method.direct_irradiance()).unwrap().iter().all(|e| *e == Vec3::ZERO),
-        "punctual is apart"
-    );
 }
 
+/// Without a threshold a bounce is the sum over all texels; with one, errors grow and cuts shrink.
 #[test]
-fn an_even_sky_gives_pi_times_its_radiance() {
+fn a_bounce_is_the_sum_over_all_texels_but_for_the_threshold() {
     let context = TestContext::new();
-    let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
-    let sky = Environment::Constant(Vec3::new(0.5, 1.0, 2.0));
-    let fixture = Fixture::new(&context, scene(vec![one_sided(0.5)], vec![plane], &[]), &sky);
-    let method = fixture.prepare(&context, SMALL);
-    fixture.solve(&context, &method, 1);
-    for irradiance in context.download(method.direct_irradiance()).unwrap() {
-        let error = (irradiance / (PI * Vec3::new(0.5, 1.0, 2.0)) - Vec3::ONE).abs().max_element();
-        assert!(error < 1e-5, "{irradiance}");
+    let floor = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
+    let wall = parallelogram(Vec3::new(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 2.0, 1, 0);
+    let ceiling = parallelogram(Vec3::new(-2.0, 2.0, -2.0), Vec3::X * 4.0, Vec3::Z * 4.0, 1, 0);
+    let lamp = (light(LightKind::Point, 7.0), Vec3::new(0.5, 1.2, 0.3), Vec3::NEG_Y);
+    let scene = scene(vec![one_sided(0.6)], vec![floor, wall, ceiling], &[lamp]);
+    let fixture = Fixture::new(&context, scene, &Environment::default());
+    let mut before = (0.0, f64::MAX);
+    for threshold in [0.0, 0.02, 0.1, 0.5] {
+        let method = fixture.prepare(&context, Settings { threshold, jitter: false, ..SMALL });
+        fixture.solve(&context, &method, 0);
+        let radiosity: Vec<Vec3> =
+            context.download(method.last_irradiance()).unwrap().iter().map(|e| 0.6 * e).collect();
+        fixture.solve(&context, &method, 1);
+        let found = context.download(method.last_irradiance()).unwrap();
+        let leaves = texels::leaves(&method.atlas);
+        let error = |sent: &[Vec3]| {
+            let (mut error, mut sum) = (0.0, 0.0);
+            for (texel, found) in method.atlas.texels.iter().zip(&found).step_by(11) {
+                let expected = twins::irradiance(texel.position.as_dvec3(), texel.normal.as_dvec3(), &leaves, sent);
+                error += found.as_dvec3().distance_squared(expected);
+                sum += expected.length_squared();
+            }
+            (error / sum).sqrt()
+        };
+        let off = error(&radiosity);
+        let cuts = context.download(method.cut_sizes()).unwrap();
+        let cut = cuts.iter().map(|&cut| f64::from(cut)).sum::<f64>() / cuts.len() as f64;
+        println!("threshold {threshold}: off by {off:.4}, cut {cut:.1} of {} texels", cuts.len());
+        if threshold == 0.0 {
+            assert!(off < 4e-3, "points stand for polygons farther than five radii: {off}");
+            let wrong: Vec<Vec3> = radiosity.iter().rev().copied().collect();
+            assert!(error(&wrong) > 0.1, "light of other texels would go unnoticed");
+        }
+        assert!(off > 0.8 * before.0 && cut <= before.1, "{off}, {cut} after {before:?}");
+        before = (off, cut);
     }
-    assert!(context.download(method.indirect_irradiance()).unwrap().iter().all(|e| *e == Vec3::ZERO));
+    assert!(before.0 > 0.01 && before.1 < 60.0, "{before:?}");
 }
 
 /// Two rooms and a closed door: with rays the dark room is dark; with maps the leak is what is printed.

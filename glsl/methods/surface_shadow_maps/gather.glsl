@@ -10,8 +10,8 @@ layout(set = 0, binding = 7, scalar) readonly buffer Texels { AtlasTexel texels[
 layout(set = 0, binding = 8, scalar) readonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 9) uniform usamplerBuffer sender_nodes;       // SENDER_NODE_TEXELS each; compact: one
 layout(set = 0, binding = 10) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
-layout(set = 0, binding = 11, scalar) readonly buffer Leaves { SenderLeaf leaves[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer LeafLights { LeafLight leaf_light[]; };
+layout(set = 0, binding = 11) uniform usamplerBuffer sender_leaves;     // SENDER_LEAF_TEXELS each
+layout(set = 0, binding = 12) uniform usamplerBuffer sender_branches;   // one each
 layout(set = 0, binding = 13, scalar) readonly buffer Adaptation { float adaptation[]; };
 layout(set = 0, binding = 14, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 15, scalar) writeonly buffer CutSizes { uint cut_sizes[]; };
@@ -23,6 +23,7 @@ layout(push_constant, scalar) uniform Params {
     uint jitter;
     float ray_offset;           // m
     float threshold;            // of what the display shows, 0..1
+    float chance_below;         // of the threshold
     float exposure;
     float key;
     float white;
@@ -34,8 +35,8 @@ bool sender_is_compact() { return COMPACT; }
 SenderFrame sender_frame() { return tree_frame[0]; }
 uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
 uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
-SenderLeaf sender_shape(uint slot) { return leaves[slot]; }
-LeafLight sender_leaf_light(uint slot) { return leaf_light[slot]; }
+uvec4 sender_leaf_texel(uint i) { return texelFetch(sender_leaves, int(i)); }
+uvec4 sender_branch_texel(uint i) { return texelFetch(sender_branches, int(i)); }
 
 void gather_texel()
 {
@@ -50,7 +51,7 @@ void gather_texel()
     float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
     vec3 reflects = albedo[index];
     scale *= max(reflects.r, max(reflects.g, reflects.b));
-    options = GatherOptions(params.threshold, scale, params.white, params.operator, 0.0, params.jitter != 0, 0u);
+    options = GatherOptions(params.threshold, scale, params.white, params.operator, 0.0, params.jitter != 0, 0u, params.chance_below);
     start_showing(0.0);
 
     vec3 origin = texel.position + params.ray_offset * texel.normal;
@@ -63,8 +64,9 @@ void gather_texel()
             uint taken = next_sender(node, params.node_count, visited);
             if (taken == NO_SENDER) break;
             ++cut;
-            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 2u, params.seed)));
-            found = arrival.direct + arrival.indirect != vec3(0.0);
+            float chance;
+            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 2u, params.seed)), chance);
+            found = is_worth_asking(arrival, chance);
         }
         if (!found) break;
         vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);

@@ -14,12 +14,15 @@ layout(set = 0, binding = 4, scalar) readonly buffer MapFrames { SurfaceMapFrame
 
 uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
 uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
-vec3 surface_map_origin(uint place) { return map_origins[place]; }
 
 float visibility(vec3 origin, vec3 target, uint leaf)
 {
     vec2 at = place_on_leaf(sender_shape(leaf), target);
-    return sender_maps_visibility(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], at, origin, receiver.geometric);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], at, origin);
+    float free = 0.0;
+    for (uint k = 0; k < asked.count; ++k)
+        free += asked.weight[k] * surface_map_visibility(map_frame[0], asked.place[k], map_origins[asked.place[k]], origin, receiver.geometric);
+    return free;
 }
 
 #include "methods/surface_shadow_maps/gather.glsl"

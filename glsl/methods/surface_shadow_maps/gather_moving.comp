@@ -4,6 +4,7 @@
 #include "lib/bvh.glsl"
 #include "lib/sender_gather.glsl"
 #include "lib/rigid_objects.glsl"
+#include "lib/sender_maps.glsl"
 #include "trace/holes.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the maps of objects that move, and by our own
@@ -19,6 +20,7 @@ layout(set = 0, binding = 19, scalar) readonly buffer MapOrigins { vec3 map_orig
 layout(set = 0, binding = 20, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
 layout(set = 0, binding = 21, scalar) readonly buffer RigidWords { uint rigid_words[]; };
 layout(set = 0, binding = 22, scalar) readonly buffer RigidObjects { RigidObject rigid_objects[]; };
+layout(set = 0, binding = 23, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -33,9 +35,16 @@ float visibility(vec3 origin, vec3 target, uint leaf)
     uint object = rigid_word(rigid_word(RIGID_TEXEL_OBJECTS) + texel);
     if (rigid_asks_rays(object, sender_object))
         return is_hit(traverse(Ray(origin, 0.0, target - origin, 1.0), true)) ? 0.0 : 1.0;
-    uint place = leaf_places[leaf], own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
-    RigidPoint sender = RigidPoint(target, leaf_normal(sender_shape(leaf)), sender_object, place, map_origins[place]);
-    return rigid_visibility(map_frame[0], sender, RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]));
+    uint own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
+    RigidPoint own = RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]);
+    SenderLeaf shape = sender_shape(leaf);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], place_on_leaf(shape, target), origin);
+    float free = 0.0;
+    for (uint k = 0; k < asked.count; ++k) {
+        RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, asked.place[k], map_origins[asked.place[k]]);
+        free += asked.weight[k] * rigid_visibility(map_frame[0], sender, own);
+    }
+    return free;
 }
 
 #include "methods/surface_shadow_maps/gather.glsl"

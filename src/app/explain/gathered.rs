@@ -12,9 +12,9 @@ use crate::app::stage::Stage;
 use crate::display::direct::Canvas;
 use crate::display::final_gather::{NO_SENDER, Visibility};
 use crate::gpu::Context;
-use crate::gpu::shaders::types::LeafLight;
 use crate::report::explanation::Light;
 use crate::stages::film::Film;
+use crate::stages::sender_tree::LeafLight;
 
 /// Arrivals that are kept of a pixel.
 const MOST_KEPT: usize = 1 << 20;
@@ -116,7 +116,7 @@ fn lights(
 
 fn leaf_light(context: &Context, method: &mut Method) -> Result<Vec<LeafLight>, AppError> {
     match method.gathering() {
-        Some(shown) => Ok(context.download(&shown.tree.leaf_light)?),
+        Some(shown) => Ok(shown.tree.leaf_light(context)?),
         None => Ok(Vec::new()),
     }
 }

@@ -24,8 +24,8 @@ impl SurfaceShadowMaps {
                     albedo: &texels.albedo,
                     sender_nodes: nodes,
                     sender_light: &tree.light,
-                    leaves: &tree.leaves,
-                    leaf_light: &tree.leaf_light,
+                    sender_leaves: &tree.leaves,
+                    sender_branches: &tree.branches,
                     adaptation: &tree.adaptation,
                     tree_frame: &tree.frame,
                     irradiance: &s.irradiance,
@@ -37,6 +37,7 @@ impl SurfaceShadowMaps {
                         jitter: u32::from(self.settings.jitter),
                         ray_offset: texels.ray_offset,
                         threshold: self.settings.threshold,
+                        chance_below: if self.settings.jitter { self.settings.chance } else { 0.0 },
                         exposure: self.tone.exposure.exp2(),
                         key,
                         white: self.tone.white,
@@ -47,7 +48,7 @@ impl SurfaceShadowMaps {
             }};
         }
         match (&self.maps, &lit.tracer) {
-            (Some(PlacedMaps { maps, leaf_places, frame, moving: Some(moving), .. }), tracer) => {
+            (Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: Some(moving), .. }), tracer) => {
                 let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = tracer;
                 gather!(GatherMoving, GatherMovingParams, {
                     constants: passes::GatherMovingConstants { alpha_test: surfaces.has_holes, compact },
@@ -63,6 +64,7 @@ impl SurfaceShadowMaps {
                     runs: &maps.runs,
                     map_origins: &maps.origins,
                     leaf_places: leaf_places,
+                    leaf_neighbours: leaf_neighbours,
                     rigid_words: &moving.words,
                     rigid_objects: &moving.present,
                 });

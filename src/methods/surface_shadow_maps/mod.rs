@@ -84,6 +84,9 @@ crate::settings! {
         threshold: f32 = 0.02, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// Draw leaves of a node, and points on them, by chance.
         jitter: bool = true, paper "not in bounces";
+        /// Senders that would change what is shown by less than this share of the threshold are asked by chance, and count
+        /// for those that are not; needs jitter.
+        chance: f32 = 0.0, range 0.0..=100.0, unit "of threshold", paper "not done";
         /// Points of each texel that shadow rays to punctual lights start from.
         light_samples: u32 = 8, range 1..=1024, unit "points", paper "shadow maps";
         /// Rays of each texel to the environment.
@@ -196,6 +199,10 @@ pub struct Report {
     pub ratio: f64,
     /// Cast for the maps; 0 where they were read from disk.
     pub map_rays: u64,
+    /// Of the maps from outside of objects that move; 0 where nothing does.
+    pub outside_bytes: u64,
+    /// Pairs (hull, object) of which the second reaches into the first's hull: rays are cast past them.
+    pub overlaps: u32,
 }
 
 impl std::fmt::Display for Report {
@@ -205,6 +212,9 @@ impl std::fmt::Display for Report {
         if self.map_bytes > 0 {
             let source = if self.map_rays > 0 { format!("{} rays", self.map_rays) } else { "read from disk".into() };
             write!(f, "; maps of {} bytes, compressed {:.1} : 1, {source}", self.map_bytes, self.ratio)?;
+        }
+        if self.outside_bytes > 0 {
+            write!(f, "; maps from outside of {} bytes, {} hulls are reached into", self.outside_bytes, self.overlaps)?;
         }
         Ok(())
     }
@@ -316,6 +326,7 @@ impl SurfaceShadowMaps {
 
     pub fn report(&self) -> Report {
         let maps = self.maps.as_ref().map(|placed| &placed.maps);
+        let moving = self.maps.as_ref().and_then(|placed| placed.moving.as_ref());
         Report {
             texels: self.texels.count,
             charts: self.atlas.chart_count,
@@ -325,6 +336,8 @@ impl SurfaceShadowMaps {
             map_bytes: maps.map_or(0, SurfaceMaps::size_bytes),
             ratio: maps.map_or(0.0, SurfaceMaps::ratio),
             map_rays: maps.map_or(0, |maps| maps.ray_count),
+            outside_bytes: moving.map_or(0, |moving| moving.outside_bytes),
+            overlaps: moving.map_or(0, |moving| moving.overlaps.len() as u32),
         }
     }
 }

@@ -88,15 +88,16 @@ impl SurfaceShadowMaps {
         self.texels.move_to(context, &self.atlas)?;
         self.tree = SenderTree::build(context, &texels::leaves(&self.atlas), self.settings.tree_options())?;
         let leaf_order = &self.tree.topology.leaf_order;
+        let before = std::mem::take(&mut moving.overlaps);
         moving.place(context, &rest.atlas, leaf_order, &world_from_rest)?;
-        for &(hull, inside) in &moving.overlaps {
+        for &(hull, inside) in moving.overlaps.iter().filter(|pair| !before.contains(pair)) {
             let [hull, inside] = [hull, inside].map(|object| match moving.objects.name(stage.scene, object) {
                 "" => "what stands still",
                 name => name,
             });
-            tracing::debug!("{inside} reaches into the hull of {hull}: ways past it are asked by rays");
+            tracing::info!("{inside} reaches into the hull of {hull}: ways past it are asked by rays");
         }
-        placed.reorder(context, leaf_order)?;
+        placed.reorder(context, &rest.atlas, leaf_order)?;
         Ok(true)
     }
 }

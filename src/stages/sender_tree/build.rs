@@ -22,7 +22,7 @@ crate::choice! {
 crate::choice! {
     /// How nodes lie in memory.
     pub enum NodeLayout {
-        /// 80 bytes of floats
+        /// 64 bytes, of which the walk reads 32
         Wide = "wide",
         /// The paper's 16 bytes, for up to 65535 nodes
         Compact = "compact",
@@ -47,7 +47,7 @@ impl Default for TreeOptions {
 
 /// A node as it lies in memory, in depth-first order: the left child of inner node `i` is `i + 1`, the right one
 /// `nodes[i + 1].skip`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Node {
     /// Bounding sphere of all corners below, metres.
     pub centre: Vec3,

@@ -21,18 +21,22 @@
 
 mod build;
 mod leaves;
+mod octahedral;
 
 pub use build::{MAX_LEAVES, Node, NodeLayout, Representative, TreeOptions, TreeTopology, area, corners, normal};
 pub use leaves::{VertexElements, VertexLeaves, disc, parallelogram, triangle, triangle_leaves};
 
 use crate::gpu::shaders::sender_tree as passes;
-use crate::gpu::shaders::types::{LeafLight, SenderFrame, SenderLeaf};
+use crate::gpu::shaders::types::{SenderFrame, SenderLeaf};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use glam::Vec3;
 
-/// Texels of a node and of its light; the layout is that of `glsl/lib/sender_tree.glsl`.
-const NODE_TEXELS: usize = 3;
+/// Texels of a node, of its light, of a leaf; `glsl/lib/sender_tree.glsl` and `sender_leaf.glsl` say what is where.
+const NODE_TEXELS: usize = 2;
 const LIGHT_TEXELS: usize = 2;
+const LEAF_TEXELS: usize = 4;
+/// In place of a right child: a leaf has none. The same constant stands in `lib/sender_tree.glsl`.
+pub const NO_SENDER: u32 = u32::MAX;
 /// Nodes that 16 bits can point behind.
 pub const MAX_COMPACT_NODES: usize = 65_535;
 
@@ -49,20 +53,30 @@ pub enum SenderTreeError {
     Gpu(#[from] GpuError),
 }
 
+/// What a leaf sends, W/m2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeafLight {
+    pub emitted: Vec3,
+    pub reflected: Vec3,
+}
+
 /// The tree on the device.
 pub struct SenderTree {
     pub topology: TreeTopology,
-    /// What the walk reads: node_count, depth first, in the layout that was asked for.
+    /// What the walk reads: node_count, depth first; the power in it is that of the last pull.
     nodes: TexelBuffer,
+    /// The same in the paper's layout, where that was asked for.
     compact: Option<TexelBuffer>,
+    /// m2, of every node.
+    areas: Buffer<f32>,
     /// One: what compact nodes are quantised in.
     pub frame: Buffer<SenderFrame>,
     /// Power of every node, W.
     pub light: TexelBuffer,
-    /// leaf_count, in tree order.
-    pub leaves: Buffer<SenderLeaf>,
-    /// leaf_count, in tree order, W/m2.
-    pub leaf_light: Buffer<LeafLight>,
+    /// Of every node, by which a leaf below it is drawn.
+    pub branches: TexelBuffer,
+    /// leaf_count, in tree order: shapes, and what they send.
+    pub leaves: TexelBuffer,
     /// One value: log-average luminance of what the leaves reflect, W m^-2 sr^-1.
     pub adaptation: Buffer<f32>,
     leaf_order: Buffer<u32>,
@@ -82,15 +96,18 @@ impl SenderTree {
         if is_compact && count > MAX_COMPACT_NODES {
             return Err(SenderTreeError::TooManyNodes { nodes: count });
         }
-        let ordered: Vec<SenderLeaf> = topology.leaf_order.iter().map(|&i| leaves[i as usize]).collect();
+        let shapes: Vec<[[u32; 4]; LEAF_TEXELS]> =
+            topology.leaf_order.iter().map(|&i| leaf_texels(&leaves[i as usize])).collect();
         let texels: Vec<[[u32; 4]; NODE_TEXELS]> = topology.nodes.iter().map(node_texels).collect();
         let tree = Self {
             nodes: context.texel_buffer("sender_tree/nodes", NODE_TEXELS * count.max(1))?,
             compact: is_compact.then(|| context.texel_buffer("sender_tree/compact nodes", count.max(1))).transpose()?,
+            areas: context
+                .upload("sender_tree/areas", &topology.nodes.iter().map(|node| node.area).collect::<Vec<_>>())?,
             frame: context.upload("sender_tree/frame", &[frame(&topology)])?,
             light: context.texel_buffer("sender_tree/light", LIGHT_TEXELS * count.max(1))?,
-            leaf_light: context.buffer("sender_tree/leaf light", ordered.len())?,
-            leaves: context.upload("sender_tree/leaves", &ordered)?,
+            branches: context.texel_buffer("sender_tree/branches", count.max(1))?,
+            leaves: context.texel_buffer("sender_tree/leaves", LEAF_TEXELS * shapes.len().max(1))?,
             adaptation: context.buffer("sender_tree/adaptation", 1)?,
             leaf_order: context.upload("sender_tree/leaf order", &topology.leaf_order)?,
             leaf_nodes: context.upload("sender_tree/leaf nodes", &topology.leaf_nodes)?,
@@ -100,6 +117,8 @@ impl SenderTree {
             topology,
         };
         context.write(tree.nodes.buffer(), texels.as_flattened())?;
+        context.write(tree.branches.buffer(), &branches(&tree.topology))?;
+        context.write(tree.leaves.buffer(), shapes.as_flattened())?;
         Ok(tree)
     }
 
@@ -116,7 +135,7 @@ impl SenderTree {
     }
 
     pub fn leaf_count(&self) -> u32 {
-        self.leaves.len() as u32
+        self.topology.leaf_order.len() as u32
     }
 
     /// Takes over what the leaves send (W/m2, in the order they were given, one entry each) and sums it upwards.
@@ -128,11 +147,11 @@ impl SenderTree {
                 &passes::LeafLight {
                     leaf_order: &self.leaf_order,
                     leaf_nodes: &self.leaf_nodes,
-                    leaves: &self.leaves,
                     emitted,
                     reflected,
-                    leaf_light: &self.leaf_light,
+                    sender_leaves: self.leaves.buffer(),
                     sender_light: self.light.buffer(),
+                    node_texels: self.nodes.buffer(),
                     params: passes::LeafLightParams { leaf_count },
                 },
                 leaf_count,
@@ -141,8 +160,10 @@ impl SenderTree {
                 let count = level[1] - level[0];
                 let pass = passes::Pull {
                     level_nodes: &self.level_nodes,
-                    node_texels: self.nodes.buffer(),
+                    node_areas: &self.areas,
                     sender_light: self.light.buffer(),
+                    node_texels: self.nodes.buffer(),
+                    branches: self.branches.buffer(),
                     params: passes::PullParams {
                         first: level[0],
                         count,
@@ -152,8 +173,7 @@ impl SenderTree {
                 recorder.dispatch(&pass, count);
             }
             let pass = passes::Adaptation {
-                leaves: &self.leaves,
-                leaf_light: &self.leaf_light,
+                sender_leaves: &self.leaves,
                 adaptation: &self.adaptation,
                 params: passes::AdaptationParams { leaf_count },
             };
@@ -171,12 +191,25 @@ impl SenderTree {
         });
     }
 
+    /// What every leaf sends since the last pull, in tree order.
+    pub fn leaf_light(&self, context: &Context) -> Result<Vec<LeafLight>, GpuError> {
+        let texels = context.download(self.leaves.buffer())?;
+        let light = |leaf: &[[u32; 4]]| {
+            let [.., emitted_r, emitted_g] = leaf[2].map(f32::from_bits);
+            let [emitted_b, r, g, b] = leaf[3].map(f32::from_bits);
+            LeafLight { emitted: Vec3::new(emitted_r, emitted_g, emitted_b), reflected: Vec3::new(r, g, b) }
+        };
+        Ok(texels.chunks(LEAF_TEXELS).take(self.topology.leaf_order.len()).map(light).collect())
+    }
+
     /// Bytes of all tables.
     pub fn size_bytes(&self) -> u64 {
         self.nodes.size_bytes()
+            + self.compact.as_ref().map_or(0, TexelBuffer::size_bytes)
+            + self.areas.size_bytes()
             + self.light.size_bytes()
             + self.leaves.size_bytes()
-            + self.leaf_light.size_bytes()
+            + self.branches.size_bytes()
             + self.leaf_order.size_bytes()
             + self.leaf_nodes.size_bytes()
             + self.level_nodes.size_bytes()
@@ -196,7 +229,25 @@ fn frame(topology: &TreeTopology) -> SenderFrame {
     SenderFrame { low, largest_radius, extent, largest_power: 0.0 }
 }
 
+/// The power is the pull's to say.
 fn node_texels(node: &Node) -> [[u32; 4]; NODE_TEXELS] {
-    let words = |v: Vec3, w: f32| [v.x, v.y, v.z, w].map(f32::to_bits);
-    [words(node.centre, node.radius), words(node.axis, node.cos_cone), [node.area.to_bits(), node.skip, node.leaf, 0]]
+    let [x, y, z, radius] = node.centre.extend(node.radius).to_array().map(f32::to_bits);
+    let axis = octahedral::pack(node.axis);
+    [[x, y, z, radius], [axis, octahedral::widened(node, axis).to_bits(), 0, node.skip]]
+}
+
+/// Shapes; the light is the pull's to say.
+fn leaf_texels(leaf: &SenderLeaf) -> [[u32; 4]; LEAF_TEXELS] {
+    let [centre, u, v] = [leaf.centre, leaf.edge_u, leaf.edge_v].map(|vector| vector.to_array().map(f32::to_bits));
+    [[centre[0], centre[1], centre[2], leaf.is_triangle], [u[0], u[1], u[2], v[0]], [v[1], v[2], 0, 0], [0; 4]]
+}
+
+/// Right children, and which leaf a leaf is; the shares are the pull's to say.
+fn branches(topology: &TreeTopology) -> Vec<[u32; 4]> {
+    let nodes = &topology.nodes;
+    let branch = |(index, node): (usize, &Node)| match node.skip as usize == index + 1 {
+        true => [NO_SENDER, node.leaf, 0, 0],
+        false => [nodes[index + 1].skip, 0, 0, 0],
+    };
+    nodes.iter().enumerate().map(branch).collect()
 }

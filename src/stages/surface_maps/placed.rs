@@ -30,12 +30,10 @@ impl PlacedMaps {
         leaf_order: &[u32],
         filters: [MapFilter; 2],
     ) -> Result<Self, GpuError> {
-        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect();
-        let beside = |&texel: &u32| neighbours(atlas, texel as usize).map(|other| maps.places[other]);
-        let leaf_neighbours: Vec<[u32; 4]> = leaf_order.iter().map(beside).collect();
         Ok(Self {
-            leaf_places: context.upload("surface_maps/leaf places", &leaf_places)?,
-            leaf_neighbours: context.upload("surface_maps/leaf neighbours", &leaf_neighbours)?,
+            leaf_places: context.upload("surface_maps/leaf places", &places(&maps, leaf_order))?,
+            leaf_neighbours: context
+                .upload("surface_maps/leaf neighbours", &neighbour_places(&maps, atlas, leaf_order))?,
             frame: context.upload("surface_maps/frame", &[maps.frame(filters[0], filters[1])])?,
             maps,
             filter: filters[0],
@@ -71,11 +69,19 @@ impl PlacedMaps {
         recorder.dispatch(&pass, count);
     }
 
-    /// Takes over a tree that was built anew over the same leaves.
-    pub fn reorder(&self, context: &Context, leaf_order: &[u32]) -> Result<(), GpuError> {
-        let leaf_places: Vec<u32> = leaf_order.iter().map(|&texel| self.maps.places[texel as usize]).collect();
-        context.write(&self.leaf_places, &leaf_places)
+    /// Takes over a tree that was built anew over the same leaves; `atlas` is that of the rest.
+    pub fn reorder(&self, context: &Context, atlas: &Atlas, leaf_order: &[u32]) -> Result<(), GpuError> {
+        context.write(&self.leaf_places, &places(&self.maps, leaf_order))?;
+        context.write(&self.leaf_neighbours, &neighbour_places(&self.maps, atlas, leaf_order))
     }
+}
+
+fn places(maps: &SurfaceMaps, leaf_order: &[u32]) -> Vec<u32> {
+    leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect()
+}
+
+fn neighbour_places(maps: &SurfaceMaps, atlas: &Atlas, leaf_order: &[u32]) -> Vec<[u32; 4]> {
+    leaf_order.iter().map(|&texel| neighbours(atlas, texel as usize).map(|other| maps.places[other])).collect()
 }
 
 /// The texels of its chart that lie beside a texel towards +u, -u, +v and -v of its sides; itself where there is none.

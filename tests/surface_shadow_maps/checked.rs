@@ -1,0 +1,66 @@
+//! The final gather by maps, by maps with rays where they leave doubt, and by rays.
+
+use crate::common::TestContext;
+use crate::fixture::{Fixture, Shown, builtin_scene};
+use glam::{UVec2, Vec3};
+use linklight::display::final_gather::{self, Visibility};
+use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps};
+use linklight::scene::environment::Environment;
+
+/// Maps so coarse that they err much.
+fn prepared(context: &TestContext, name: &str, bounces: u32) -> (Fixture, SurfaceShadowMaps) {
+    let fixture = Fixture::new(context, builtin_scene(name), &Environment::default());
+    let settings = Settings { atlas_resolution: 32, map_resolution: 16, keep_maps: false, ..Settings::default() };
+    let method = fixture.prepare(context, settings);
+    fixture.solve(context, &method, bounces);
+    (fixture, method)
+}
+
+fn show(
+    context: &TestContext,
+    (fixture, method): &(Fixture, SurfaceShadowMaps),
+    gather_visibility: Visibility,
+    gather_map_reach: f32,
+) -> Shown {
+    let settings = final_gather::Settings { gather_visibility, gather_map_reach, ..Default::default() };
+    fixture.show(context, method, settings, UVec2::new(48, 48))
+}
+
+#[test]
+fn rays_where_maps_leave_doubt_mend_most_of_their_error() {
+    let context = TestContext::new();
+    let prepared = prepared(&context, "cornell-box", 1);
+    let rays = show(&context, &prepared, Visibility::Rays, 4.0);
+    let maps = show(&context, &prepared, Visibility::Maps, 4.0);
+    let checked = show(&context, &prepared, Visibility::Checked, 4.0);
+    println!("rays: {}", rays.report);
+    println!("maps: off by {:.4}; {}", maps.off(&rays), maps.report);
+    println!("checked: off by {:.4}; {}", checked.off(&rays), checked.report);
+    assert_eq!(maps.report.mean_rays, 0.0, "a box without a sky asks maps alone");
+    assert!(maps.off(&rays) > 0.01, "maps that never err would tell nothing");
+    assert!(checked.off(&rays) < 0.5 * maps.off(&rays));
+    assert!(checked.report.mean_rays > 1.0 && checked.report.mean_rays < 0.7 * rays.report.mean_rays);
+
+    // A farther reach leaves less to the maps; one that holds all leaves nothing, and the picture is that of rays.
+    let far = show(&context, &prepared, Visibility::Checked, 12.0);
+    assert!(far.report.mean_rays > checked.report.mean_rays);
+    let all = show(&context, &prepared, Visibility::Checked, 1000.0);
+    println!("checked without maps: off by {:.2e}; {}", all.off(&rays), all.report);
+    assert!(all.off(&rays) < 1e-5 && (all.report.mean_rays / rays.report.mean_rays - 1.0).abs() < 1e-4);
+    assert!(show(&context, &prepared, Visibility::Checked, 4.0).indirect == checked.indirect, "the same to the bit");
+}
+
+/// A closed room of albedo 1/2 that emits 1 everywhere, seen through maps: pi / 2^k again and again.     [common ground]
+#[test]
+fn the_furnace_is_even_through_maps() {
+    let context = TestContext::new();
+    let prepared = prepared(&context, "furnace", 1);
+    for visibility in [Visibility::Maps, Visibility::Checked] {
+        let shown = show(&context, &prepared, visibility, 4.0);
+        let mean = |values: &[Vec3]| values.iter().map(|v| f64::from(v.x)).sum::<f64>() / values.len() as f64;
+        let (direct, indirect) = (mean(&shown.direct), mean(&shown.indirect));
+        println!("{visibility:?}: direct {direct:.4}, indirect {indirect:.4}; {}", shown.report);
+        // Emitted, and reflected once; reflected twice and three times.
+        assert!((direct / 1.5 - 1.0).abs() < 0.02 && (indirect / 0.375 - 1.0).abs() < 0.02);
+    }
+}
