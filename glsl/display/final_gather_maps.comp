@@ -18,8 +18,7 @@ layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame
 layout(set = 0, binding = 25) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 26) uniform usamplerBuffer runs;
 layout(set = 0, binding = 27, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place
-layout(set = 0, binding = 28, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
-layout(set = 0, binding = 30, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
+layout(set = 0, binding = 28, scalar) readonly buffer LeafMapTable { LeafMaps leaf_maps[]; };
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -32,7 +31,7 @@ uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
 bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
 {
     SenderLeaf shape = sender_shape(leaf);
-    uint place = leaf_places[leaf];
+    uint place = leaf_maps[leaf].place;
     if (CHECKED) {
         vec3 d = target - origin;
         float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
@@ -42,7 +41,7 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
         return is_far && is_sure;
     }
     vec2 at = place_on_leaf(shape, target);
-    SenderPlaces asked = sender_places(map_frame[0], place, leaf_neighbours[leaf], at, origin);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_maps[leaf], at, origin);
     free = 0.0;
     for (uint k = 0; k < asked.count; ++k)
         free += asked.weight[k] * surface_map_visibility(map_frame[0], asked.place[k], map_origins[asked.place[k]], origin, receiver.geometric);

@@ -18,10 +18,9 @@ layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame
 layout(set = 0, binding = 25) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 26) uniform usamplerBuffer runs;
 layout(set = 0, binding = 27, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place, at rest
-layout(set = 0, binding = 28, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
+layout(set = 0, binding = 28, scalar) readonly buffer LeafMapTable { LeafMaps leaf_maps[]; };
 layout(set = 0, binding = 30, scalar) readonly buffer RigidWords { uint rigid_words[]; };
 layout(set = 0, binding = 31, scalar) readonly buffer RigidObjects { RigidObject rigid_objects[]; };
-layout(set = 0, binding = 32, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -50,7 +49,7 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || is_near) return false;
     uint own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
     RigidPoint own = RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]);
-    SenderPlaces asked = sender_places(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], place_on_leaf(shape, target), origin);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_maps[leaf], place_on_leaf(shape, target), origin);
     for (uint k = 0; k < asked.count; ++k) {
         RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, asked.place[k], map_origins[asked.place[k]]);
         free += asked.weight[k] * rigid_visibility(map_frame[0], sender, own);

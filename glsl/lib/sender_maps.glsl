@@ -5,6 +5,12 @@
 #include "lib/sender_tree.glsl"
 #include "lib/surface_map.glsl"
 
+// Of a leaf: the place of its texel's map, and of those of the texels towards +u, -u, +v and -v, its own where there is none.
+struct LeafMaps {
+    uint place;
+    uvec4 around;
+};
+
 // Where a point of the leaf lies on it, -1/2..1/2 along either side.
 vec2 place_on_leaf(SenderLeaf leaf, vec3 point)
 {
@@ -21,10 +27,11 @@ struct SenderPlaces {
     vec3 weight;
 };
 
-// `around` are the places of the texels towards +u, -u, +v and -v, its own where there is none. At a texel's border it
-// counts as much as its neighbour. `point` is what is seen: it tells the chances.
-SenderPlaces sender_places(SurfaceMapFrame frame, uint place, uvec4 around, vec2 at, vec3 point)
+// At a texel's border it counts as much as its neighbour. `point` is what is seen: it tells the chances.
+SenderPlaces sender_places(SurfaceMapFrame frame, LeafMaps maps, vec2 at, vec3 point)
 {
+    uint place = maps.place;
+    uvec4 around = maps.around;
     vec2 share = abs(at);
     uint beside_u = at.x >= 0.0 ? around.x : around.y, beside_v = at.y >= 0.0 ? around.z : around.w;
     if (frame.sender_filter == 1) {

@@ -65,7 +65,7 @@ crate::settings! {
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// Senders that would change what is shown by less than this share of the threshold are asked by chance, and count
         /// for those that are not; needs jitter.
-        gather_chance: f32 = 0.5, range 0.0..=100.0, unit "of gather_threshold", paper "not done";
+        gather_chance: f32 = 0.05, range 0.0..=100.0, unit "of gather_threshold", paper "not done";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Checked maps are not asked of senders nearer than so many of their radii, rays are.
@@ -280,7 +280,7 @@ impl FinalGather {
             return;
         }
         match (from.tracer, from.maps.filter(|_| by_maps)) {
-            (_, Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: Some(moving), .. })) => gather!(
+            (_, Some(PlacedMaps { maps, leaf_maps, frame, moving: Some(moving), .. })) => gather!(
                 FinalGatherMoving,
                 FinalGatherMovingParams,
                 surfaces,
@@ -291,8 +291,7 @@ impl FinalGather {
                 run_offsets: &maps.run_offsets,
                 runs: &maps.runs,
                 map_origins: &maps.origins,
-                leaf_places: leaf_places,
-                leaf_neighbours: leaf_neighbours,
+                leaf_maps: leaf_maps,
                 rigid_words: &moving.words,
                 rigid_objects: &moving.present
             ),
@@ -307,8 +306,7 @@ impl FinalGather {
                 run_offsets: &placed.maps.run_offsets,
                 runs: &placed.maps.runs,
                 map_origins: &placed.maps.origins,
-                leaf_places: &placed.leaf_places,
-                leaf_neighbours: &placed.leaf_neighbours
+                leaf_maps: &placed.leaf_maps
             ),
             (Tracer::Compute(bvh, surfaces), None) => gather!(
                 FinalGather,

@@ -153,7 +153,8 @@ fn chance_spares_rays() {
     };
     let [(all, light, off), (some, some_light, some_off)] = [0.0, 1.0].map(run);
     assert!(some.mean_rays < 0.6 * all.mean_rays && some.mean_rays > 1.0, "{some}");
-    assert!((some_light / light - 1.0).abs() < 0.005, "{some_light} for {light}");
+    // Three standard errors of the noise of 900 pixels.
+    assert!((some_light / light - 1.0).abs() < 0.04, "{some_light} for {light}");
     assert!(some_off < 3.0 * off, "{some_off} for {off}");
 }
 

@@ -153,7 +153,8 @@ fn a_sliding_box_and_a_turning_bar_are_seen_as_rays_see_them() {
 fn a_bounce_among_moving_objects_is_that_of_rays() {
     let context = TestContext::new();
     let prepare = |sender_filter| {
-        posed(&context, 0.0).prepare(&context, Settings { threshold: 0.0, sender_filter, ..settings() })
+        let settings = Settings { threshold: 0.0, map_resolution: 16, sender_filter, ..settings() };
+        posed(&context, 0.0).prepare(&context, settings)
     };
     let check = |by_maps: &mut SurfaceShadowMaps, seconds| -> Vec<Vec3> {
         let fixture = posed(&context, seconds);
@@ -220,5 +221,5 @@ fn a_picture_of_moving_objects_is_that_of_rays() {
         100.0 * checked,
         100.0 * none
     );
-    assert!(maps < 0.05 && checked < maps && none > 2.0 * maps);
+    assert!(maps < 0.05 && checked < 1.05 * maps && none > 2.0 * maps);
 }

@@ -17,10 +17,9 @@ layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame
 layout(set = 0, binding = 17) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 18) uniform usamplerBuffer runs;
 layout(set = 0, binding = 19, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place, at rest
-layout(set = 0, binding = 20, scalar) readonly buffer LeafPlaces { uint leaf_places[]; };
+layout(set = 0, binding = 20, scalar) readonly buffer LeafMapTable { LeafMaps leaf_maps[]; };
 layout(set = 0, binding = 21, scalar) readonly buffer RigidWords { uint rigid_words[]; };
 layout(set = 0, binding = 22, scalar) readonly buffer RigidObjects { RigidObject rigid_objects[]; };
-layout(set = 0, binding = 23, scalar) readonly buffer LeafNeighbours { uvec4 leaf_neighbours[]; };   // their places
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
@@ -38,7 +37,7 @@ float visibility(vec3 origin, vec3 target, uint leaf)
     uint own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
     RigidPoint own = RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]);
     SenderLeaf shape = sender_shape(leaf);
-    SenderPlaces asked = sender_places(map_frame[0], leaf_places[leaf], leaf_neighbours[leaf], place_on_leaf(shape, target), origin);
+    SenderPlaces asked = sender_places(map_frame[0], leaf_maps[leaf], place_on_leaf(shape, target), origin);
     float free = 0.0;
     for (uint k = 0; k < asked.count; ++k) {
         RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, asked.place[k], map_origins[asked.place[k]]);

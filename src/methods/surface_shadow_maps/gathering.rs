@@ -48,7 +48,7 @@ impl SurfaceShadowMaps {
             }};
         }
         match (&self.maps, &lit.tracer) {
-            (Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: Some(moving), .. }), tracer) => {
+            (Some(PlacedMaps { maps, leaf_maps, frame, moving: Some(moving), .. }), tracer) => {
                 let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = tracer;
                 gather!(GatherMoving, GatherMovingParams, {
                     constants: passes::GatherMovingConstants { alpha_test: surfaces.has_holes, compact },
@@ -63,20 +63,18 @@ impl SurfaceShadowMaps {
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
                     map_origins: &maps.origins,
-                    leaf_places: leaf_places,
-                    leaf_neighbours: leaf_neighbours,
+                    leaf_maps: leaf_maps,
                     rigid_words: &moving.words,
                     rigid_objects: &moving.present,
                 });
             }
-            (Some(PlacedMaps { maps, leaf_places, leaf_neighbours, frame, moving: None, .. }), _) => {
+            (Some(PlacedMaps { maps, leaf_maps, frame, moving: None, .. }), _) => {
                 gather!(GatherMaps, GatherMapsParams, {
                     constants: passes::GatherMapsConstants { compact },
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
                     map_origins: &maps.origins,
-                    leaf_places: leaf_places,
-                    leaf_neighbours: leaf_neighbours,
+                    leaf_maps: leaf_maps,
                     map_frame: frame,
                 })
             }

@@ -2,7 +2,7 @@
 
 use super::{MapFilter, MovingMaps, SurfaceMaps};
 use crate::gpu::shaders::surface_maps as passes;
-use crate::gpu::shaders::types::{AtlasTexel, SurfaceMapFrame};
+use crate::gpu::shaders::types::{AtlasTexel, LeafMaps, SurfaceMapFrame};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::atlas::Atlas;
 use glam::UVec2;
@@ -10,10 +10,8 @@ use glam::UVec2;
 /// The maps as the leaves of a sender tree ask them.
 pub struct PlacedMaps {
     pub maps: SurfaceMaps,
-    /// Place in the sequence of each leaf, in tree order.
-    pub leaf_places: Buffer<u32>,
-    /// Of the same leaves: places of the texels beside them along their sides, u first, then v; back and forth.
-    pub leaf_neighbours: Buffer<[u32; 4]>,
+    /// Which maps each leaf is seen by, in tree order.
+    pub leaf_maps: Buffer<LeafMaps>,
     /// One: how the maps are read.
     pub frame: Buffer<SurfaceMapFrame>,
     pub filter: MapFilter,
@@ -31,9 +29,7 @@ impl PlacedMaps {
         filters: [MapFilter; 2],
     ) -> Result<Self, GpuError> {
         Ok(Self {
-            leaf_places: context.upload("surface_maps/leaf places", &places(&maps, leaf_order))?,
-            leaf_neighbours: context
-                .upload("surface_maps/leaf neighbours", &neighbour_places(&maps, atlas, leaf_order))?,
+            leaf_maps: context.upload("surface_maps/leaf maps", &leaf_maps(&maps, atlas, leaf_order))?,
             frame: context.upload("surface_maps/frame", &[maps.frame(filters[0], filters[1])])?,
             maps,
             filter: filters[0],
@@ -71,17 +67,16 @@ impl PlacedMaps {
 
     /// Takes over a tree that was built anew over the same leaves; `atlas` is that of the rest.
     pub fn reorder(&self, context: &Context, atlas: &Atlas, leaf_order: &[u32]) -> Result<(), GpuError> {
-        context.write(&self.leaf_places, &places(&self.maps, leaf_order))?;
-        context.write(&self.leaf_neighbours, &neighbour_places(&self.maps, atlas, leaf_order))
+        context.write(&self.leaf_maps, &leaf_maps(&self.maps, atlas, leaf_order))
     }
 }
 
-fn places(maps: &SurfaceMaps, leaf_order: &[u32]) -> Vec<u32> {
-    leaf_order.iter().map(|&texel| maps.places[texel as usize]).collect()
-}
-
-fn neighbour_places(maps: &SurfaceMaps, atlas: &Atlas, leaf_order: &[u32]) -> Vec<[u32; 4]> {
-    leaf_order.iter().map(|&texel| neighbours(atlas, texel as usize).map(|other| maps.places[other])).collect()
+fn leaf_maps(maps: &SurfaceMaps, atlas: &Atlas, leaf_order: &[u32]) -> Vec<LeafMaps> {
+    let of = |&texel: &u32| LeafMaps {
+        place: maps.places[texel as usize],
+        around: neighbours(atlas, texel as usize).map(|other| maps.places[other]),
+    };
+    leaf_order.iter().map(of).collect()
 }
 
 /// The texels of its chart that lie beside a texel towards +u, -u, +v and -v of its sides; itself where there is none.
