@@ -67,8 +67,7 @@ void main()
         }
     }
     if (weight_sum <= 0.0) return;
-    Surface s = seen.surface;
-    vec3 reflectance = params.weight / weight_sum * (s.albedo + specular_albedo(s, dot(s.normal, seen.to_eye))) / PI;
+    vec3 reflectance = params.weight / weight_sum * even_albedo(seen.surface, dot(seen.surface.normal, seen.to_eye)) / PI;
     direct[index] += reflectance * direct_sum;
     indirect[index] += reflectance * indirect_sum;
 }

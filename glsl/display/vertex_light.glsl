@@ -21,8 +21,7 @@ ElementPixel element_pixel(Seen seen)
         if (backs.x != NO_ELEMENT) elements = backs;
     }
     // Interpolated irradiance reflects as if it came evenly from all sides, the specular lobe included.
-    Surface s = seen.surface;
-    vec3 reflectance = params.weight * (s.albedo + specular_albedo(s, dot(s.normal, seen.to_eye))) / PI;
+    vec3 reflectance = params.weight * even_albedo(seen.surface, dot(seen.surface.normal, seen.to_eye)) / PI;
     return ElementPixel(elements, seen.weights, reflectance);
 }
 

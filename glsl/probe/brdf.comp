@@ -1,6 +1,7 @@
 #version 460
 #include "lib/prelude.glsl"
 #include "lib/brdf.glsl"
+#include "lib/specular_albedo.glsl"
 
 // One thread per case: the material model by itself, for tests.
 // reads cases[case_count]   writes results[case_count]   shared none
@@ -19,6 +20,8 @@ struct BrdfResult {
     vec3 value;         // of the two directions, sr^-1
     float density;      // of drawing to_light, sr^-1
     vec3 drawn;         // by lobe and place
+    vec3 specular;      // reflected to the eye of even light, 1
+    vec3 diffuse;
 };
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Cases { BrdfCase cases[]; };
@@ -42,4 +45,6 @@ void main()
     results[i].value = brdf_value(s, c.to_eye, c.to_light);
     results[i].density = brdf_density(s, c.to_eye, c.to_light);
     results[i].drawn = brdf_sample(s, c.to_eye, c.lobe, c.place);
+    results[i].specular = specular_albedo(s, dot(s.normal, c.to_eye));
+    results[i].diffuse = diffuse_albedo(s, dot(s.normal, c.to_eye));
 }

@@ -238,14 +238,6 @@ pub const PAPERS: &[Paper] = &[
     },
     KAJIYA_1986,
     Paper {
-        key: "Karis2014",
-        title: "Physically Based Shading on Mobile",
-        authors: "Brian Karis",
-        year: 2014,
-        venue: "Unreal Engine blog, Epic Games",
-        doi: None,
-    },
-    Paper {
         key: "Kreutzer2014",
         title: "A Unified Sparse Matrix Data Format for Efficient General Sparse Matrix-Vector Multiplication on Modern \
                 Processors with Wide SIMD Units",

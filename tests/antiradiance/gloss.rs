@@ -1,7 +1,7 @@
 //! Glossy leaves against plain versions: their lobes, what they send of direct light and of what arrived, what the eye sees.
 
 use crate::common::TestContext;
-use crate::common::lobe::{brdf, specular_albedo};
+use crate::common::lobe::{brdf, diffuse_albedo, even_albedo, specular_albedo};
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::Fixture;
 use crate::support::{by_node, entries, prepare, settings, solve};
@@ -211,9 +211,10 @@ fn the_eye_sees_the_lobes() {
         let eye = (view.position - positions[own.element as usize]).as_dvec3().normalize();
         let element = own.element as usize;
         let diffuse = albedo[element].as_dvec3();
-        let seen = specular_albedo(lobe.f0.as_dvec3(), 1.0, lobe.alpha.into(), own.normal.as_dvec3().dot(eye));
-        let sent = diffuse * indirect[element].as_dvec3() + PI * state.radiance(leaf as usize, eye, 1e9);
-        expected.push(sent / (diffuse + seen).max(DVec3::splat(1e-4)));
+        let (f0, cos_eye) = (lobe.f0.as_dvec3(), own.normal.as_dvec3().dot(eye));
+        let own = diffuse_albedo(diffuse, f0, 1.0, cos_eye) * indirect[element].as_dvec3();
+        let sent = own + PI * state.radiance(leaf as usize, eye, 1e9);
+        expected.push(sent / even_albedo(diffuse, f0, 1.0, lobe.alpha.into(), cos_eye).max(DVec3::splat(1e-4)));
         found.push(shown[element]);
     }
     assert!(difference(&found, &expected) < 1e-3, "{}", difference(&found, &expected));

@@ -1,10 +1,11 @@
 //! Closed forms and conservation laws.
 
 use crate::common::TestContext;
+use crate::common::lobe::specular_albedo;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{prepare, settings, solve};
-use glam::{Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4};
 use linklight::methods::antiradiance::{AntiradianceError, Scheme, Settings};
 use linklight::scene::environment::{Environment, EnvironmentMap};
 use linklight::scene::pose::Pose;
@@ -257,14 +258,10 @@ fn a_glossy_furnace_neither_makes_nor_loses_light() {
             mean(&solution.direct, &area) + mean(&solution.indirect, &area)
         })
         .collect();
-    // What arrives first is emission; what arrives next was reflected by lobes alone: by the fit of their albedo that the
-    // display uses too, [Karis2014], averaged over the hemisphere.
-    let roughness = (0.25f64.powi(2) + 1.0 / 128.0).powf(0.25);
-    let albedo = |cosine: f64| {
-        let r = [1.0 - roughness, 0.0425 - 0.0275 * roughness, 1.04 - 0.572 * roughness, 0.022 * roughness - 0.04];
-        let a004 = (r[0] * r[0]).min((-9.28 * cosine).exp2()) * r[0] + r[1];
-        0.5 * (r[2] - 1.04 * a004) + r[3] + 1.04 * a004
-    };
+    // What arrives first is emission; what arrives next was reflected by lobes alone: by their albedo, averaged over the
+    // hemisphere.
+    let alpha = (0.25f64.powi(2) + 1.0 / 128.0).sqrt();
+    let albedo = |cosine: f64| specular_albedo(DVec3::splat(0.5), 1.0, alpha, cosine).x;
     let steps = (0..1000).map(|k| (f64::from(k) + 0.5) / 1000.0);
     let expected = steps.map(|cosine| 2.0 * cosine * albedo(cosine) / 1000.0).sum::<f64>();
     let ratio =

@@ -31,11 +31,12 @@ fn the_error_of_a_glossy_room_falls_with_bins_and_elements() {
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
         let figure = |name: &str| json["figures"][name].as_f64().unwrap();
         println!("{elements} elements, N = {bins}: relMSE {:.4}, energy {:.3}", figure("relmse"), figure("energy"));
-        figure("relmse")
+        (figure("relmse"), figure("energy"))
     };
-    let few = error(600, 10);
-    let coarse = error(3000, 3);
-    let best = error(3000, 10);
+    let (few, _) = error(600, 10);
+    let (coarse, _) = error(3000, 3);
+    let (best, energy) = error(3000, 10);
+    assert!((energy - 1.0).abs() < 0.03, "energy {energy}");
     assert!(
         best < 0.8 * few && best < 0.8 * coarse && best < 0.1,
         "{few} with few elements, {coarse} with few bins, {best}"

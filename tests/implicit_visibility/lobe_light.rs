@@ -1,6 +1,6 @@
 //! Light of emitters and punctual lights in the lobes of elements, and what the eye sees of them, against plain versions.
 
-use crate::common::lobe::{brdf, specular_albedo};
+use crate::common::lobe::{brdf, diffuse_albedo, even_albedo};
 use crate::common::scenes::{light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
@@ -228,9 +228,10 @@ fn what_the_display_reflects_evenly_is_what_the_lobe_sends() {
             for (&leaf, sent) in glossy.iter().zip(to_eye) {
                 let (lobe, diffuse) = (&case.lobes[leaf as usize], albedo[leaf as usize].as_dvec3());
                 let cos_eye = towards(eye, case.positions[leaf as usize]).dot(case.normals[leaf as usize].as_dvec3());
-                let even = specular_albedo(lobe.f0.as_dvec3(), 1.0, widened(lobe, 1_000_000_000), cos_eye);
-                let light = diffuse * irradiance[leaf as usize].as_dvec3() + PI * sent.as_dvec3();
-                shown[leaf as usize] = (light / (diffuse + even).max(DVec3::splat(1e-4))).as_vec3();
+                let (f0, alpha) = (lobe.f0.as_dvec3(), widened(lobe, 1_000_000_000));
+                let own = diffuse_albedo(diffuse, f0, 1.0, cos_eye) * irradiance[leaf as usize].as_dvec3();
+                let even = even_albedo(diffuse, f0, 1.0, alpha, cos_eye).max(DVec3::splat(1e-4));
+                shown[leaf as usize] = ((own + PI * sent.as_dvec3()) / even).as_vec3();
             }
             shown
         };

@@ -3,6 +3,7 @@
 //! The G-buffer comes from the device (it has a test of its own); shadow maps are in `tests/display.rs`: nothing here
 //! stands between a surface and a light.
 
+use crate::common::lobe;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
@@ -145,12 +146,10 @@ pub fn brdf(albedo: Vec4, specular: Vec4, normal: Vec3, alpha: f32, to_eye: Vec3
     albedo.truncate() * (1.0 - fresnel.max_element()) / PI + fresnel * distribution * shadowing
 }
 
-/// Share of even light that the specular lobe sends to the eye.                                   [Karis2014]
-pub fn specular_albedo(albedo: Vec4, specular: Vec4, alpha: f32, cos_eye: f32) -> Vec3 {
-    let r = alpha.sqrt() * Vec4::new(-1.0, -0.0275, -0.572, 0.022) + Vec4::new(1.0, 0.0425, 1.04, -0.04);
-    let a004 = (r.x * r.x).min((-9.28 * cos_eye.clamp(0.0, 1.0)).exp2()) * r.x + r.y;
-    let (scale, bias) = (-1.04 * a004 + r.z, 1.04 * a004 + r.w);
-    (specular.truncate() * scale + albedo.w * bias).clamp(Vec3::ZERO, Vec3::ONE)
+/// Share of even light that a surface of the G-buffer sends to the eye.
+pub fn even_albedo(albedo: Vec4, specular: Vec4, alpha: f32, cos_eye: f32) -> Vec3 {
+    let (diffuse, f0) = (albedo.truncate().as_dvec3(), specular.truncate().as_dvec3());
+    lobe::even_albedo(diffuse, f0, albedo.w.into(), alpha.into(), cos_eye.into()).as_vec3()
 }
 
 impl Case {
@@ -191,8 +190,7 @@ impl Case {
                 let blend = |values: &[Vec3]| -> Vec3 {
                     corners.iter().zip(weights).map(|(&v, w)| w * values[first + v]).sum()
                 };
-                let even = specular_albedo(albedo, specular, n.w, normal.dot(to_eye));
-                let reflectance = (albedo.truncate() + even) / PI;
+                let reflectance = even_albedo(albedo, specular, n.w, normal.dot(to_eye)) / PI;
                 direct += reflectance * blend(&self.direct_irradiance);
                 indirect = reflectance * blend(&self.indirect_irradiance);
             }

@@ -2,7 +2,7 @@
 
 use crate::common::{Random, TestContext};
 use crate::compare::{hold, tells_apart};
-use crate::display::{Case, RADIANCE, SIZE, Surfaces, case, specular_albedo};
+use crate::display::{Case, RADIANCE, SIZE, Surfaces, case, even_albedo};
 use glam::{IVec2, UVec2, Vec2, Vec3};
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
@@ -64,7 +64,7 @@ fn twin(case: &Case, atlas: &Atlas, surfaces: &Surfaces, texels: &[Vec3], of_all
                 weight_sum += w;
             }
         }
-        let reflectance = albedo.truncate() + specular_albedo(albedo, specular, n.w, n.truncate().dot(to_eye));
+        let reflectance = even_albedo(albedo, specular, n.w, n.truncate().dot(to_eye));
         if weight_sum > 0.0 { reflectance / PI * sum / weight_sum } else { Vec3::ZERO }
     };
     (0..surfaces.triangle.len()).map(pixel).collect()

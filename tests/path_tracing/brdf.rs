@@ -72,8 +72,13 @@ impl Twin {
 
     /// Radiance reflected to the eye under a uniform environment of radiance 1.
     pub fn directional_albedo(&self, to_eye: DVec3) -> DVec3 {
+        self.albedo_within(to_eye, 2048)
+    }
+
+    /// The same over a grid of `side` by `side` directions.
+    fn albedo_within(&self, to_eye: DVec3, side: u32) -> DVec3 {
         let mut sum = DVec3::ZERO;
-        for_sphere(2048, |to_light, solid_angle| {
+        for_sphere(side, |to_light, solid_angle| {
             sum += self.value(to_eye, to_light) * self.normal.dot(to_light).max(0.0) * solid_angle;
         });
         sum
@@ -183,6 +188,36 @@ fn densities_integrate_to_one() {
             }
         }
     }
+}
+
+/// What the displays take for the reflection of even light is the integral of the model.
+#[test]
+fn even_light_is_reflected_as_the_model_integrates_to() {
+    let context = TestContext::new();
+    let (mut cases, mut expected) = (Vec::new(), Vec::new());
+    for alpha in [0.1, 0.25, 0.5, 1.0] {
+        for mut twin in materials(alpha) {
+            for cos_eye in [0.15f64, 0.5, 0.95] {
+                let to_eye = DVec3::new((1.0 - cos_eye * cos_eye).sqrt(), 0.0, cos_eye);
+                cases.push(twin.case(to_eye, DVec3::Z, 0.5, Vec2::splat(0.5)));
+                let whole = twin.albedo_within(to_eye, 384);
+                twin.albedo = DVec3::ZERO;
+                let specular = twin.albedo_within(to_eye, 384);
+                expected.push((specular, whole - specular));
+            }
+        }
+    }
+    let found = run(&context, &cases);
+    let off = |found: Vec3, wanted: DVec3| (found.as_dvec3() - wanted).abs().max_element();
+    let errors = found.iter().zip(&expected);
+    let (specular, diffuse) = errors.fold((0.0f64, 0.0f64), |worst, (found, (specular, diffuse))| {
+        (worst.0.max(off(found.specular, *specular)), worst.1.max(off(found.diffuse, *diffuse)))
+    });
+    println!("at most {specular:.4} off by the specular lobe, {diffuse:.4} by the diffuse one");
+    assert!(specular < 0.04 && diffuse < 0.002, "{specular} {diffuse}");
+    // A lobe that is a little wider is told apart.
+    let next = found.iter().skip(12).zip(&expected);
+    assert!(next.fold(0.0f64, |worst, (found, (specular, _))| worst.max(off(found.specular, *specular))) > 0.1);
 }
 
 const ROWS: usize = 16;

@@ -47,7 +47,8 @@ void main()
     // What the display multiplies with: the surface's own lobe, not the widened one.
     Surface s = glossy_surface(gloss[leaf], sees_front ? normal : -normal);
     s.alpha = gloss[leaf].alpha;
-    vec3 reflectance = albedo[element] + specular_albedo(s, dot(s.normal, to_eye));
-    vec3 sent = albedo[element] * irradiance[element] + PI * glossy_radiance(leaf, to_eye);
-    shown[element] = sent / max(reflectance, vec3(1e-4));
+    s.albedo = albedo[element];
+    float cos_eye = dot(s.normal, to_eye);
+    vec3 sent = diffuse_albedo(s, cos_eye) * irradiance[element] + PI * glossy_radiance(leaf, to_eye);
+    shown[element] = sent / max(even_albedo(s, cos_eye), vec3(1e-4));
 }

@@ -30,6 +30,8 @@ void main()
     vec3 direction = normalize(params.eye.xyz - params.eye.w * element_positions[element]);
     // What the display multiplies with: the surface's own lobe, not the widened one.
     Surface s = glossy_surface(lobes[vertex_of(element_vertices[element])], normal, 1e12);
-    vec3 reflectance = albedo[element] + specular_albedo(s, max(dot(normal, direction), 0.0));
-    shown[element] = (albedo[element] * irradiance[element] + PI * to_eye[glossy]) / max(reflectance, vec3(1e-4));
+    s.albedo = albedo[element];
+    float cos_eye = dot(normal, direction);
+    vec3 sent = diffuse_albedo(s, cos_eye) * irradiance[element] + PI * to_eye[glossy];
+    shown[element] = sent / max(even_albedo(s, cos_eye), vec3(1e-4));
 }
