@@ -16,14 +16,23 @@ struct HierarchyNode {
     vec3 half_v;
 };
 
-// One per vertex: both sides of its cell.
+// One per vertex, or per patch of a flat part: both sides of the cells of its members.
 struct HierarchyLeaf {
-    vec3 normal;        // unit, of the cell's vector area
+    vec3 normal;        // unit, of the cells' vector area
     float area;         // length of the vector area, m2
     uint node;
-    uint element;       // of the front
-    uint back_element;  // NONE where one-sided
+    uint element;       // of the front of its middle vertex
+    uint back_element;  // of its back; NONE where one-sided
     uint flags;
+    uint first_member;  // its vertices, in the list of all leaves'
+    uint member_count;
+    uvec2 along;        // vertices that its rectangle lies along; NONE: its middle vertex's shortest edge
+};
+
+// A leaf that a vertex takes light from.
+struct LeafShare {
+    uint leaf;
+    float share;        // all of a vertex sum to 1
 };
 const uint NONE = 0xffffffffu;
 const uint BLOCKS_BEHIND = 1u;      // light that meets the back is blocked

@@ -1,15 +1,18 @@
 //! Splatting display: flat patches as rectangles that fade into one another, everything else between vertices; punctual
 //! light per pixel by shadow maps.                                                        [Dachsbacher2007 4.3]
 //!
-//! Three passes: which surface each pixel sees (the G-buffer's triangles, by the surface of each); the patches' light,
-//! weighted; the sums divided by the weights. Light is thus shown where it was computed, at the patches' centres.
+//! Three passes: which surface each pixel sees (the G-buffer's triangles, by the surface of each); the patches' light, the
+//! mean over their vertices, weighted; the sums divided by the weights. Light is thus shown where it was computed, at the
+//! patches' centres.
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
 use super::PixelView;
 use super::direct::Canvas;
 use super::vertex::VertexLight;
-use crate::gpu::shaders::display::{Splat, SplatNormalize, SplatNormalizeParams, SplatParams};
+use crate::gpu::shaders::display::{
+    Splat, SplatLight as LightOfSplats, SplatLightParams, SplatNormalize, SplatNormalizeParams, SplatParams,
+};
 use crate::gpu::{
     Blend, Context, Format, GpuError, Image, ImageDescription, Load, RasterState, Recorder, Shape, Target,
 };
@@ -57,13 +60,22 @@ pub fn add(
 ) {
     let Canvas { world, g_buffer, film, .. } = canvas;
     let SplatLight { vertices, splats, sums } = light;
+    let light_of_splats = LightOfSplats {
+        splats: &splats.splats,
+        shares: &splats.shares,
+        back_elements: vertices.back_elements,
+        direct_irradiance: vertices.direct_irradiance,
+        indirect_irradiance: vertices.indirect_irradiance,
+        splat_light: &splats.light,
+        params: SplatLightParams { splat_count: splats.count },
+    };
+    recorder.dispatch(&light_of_splats, splats.count);
     let splat = Splat {
         splats: &splats.splats,
         visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
         g_position: g_buffer.sampled(&g_buffer.position),
         triangle_surfaces: &splats.triangle_surfaces,
-        direct_irradiance: vertices.direct_irradiance,
-        indirect_irradiance: vertices.indirect_irradiance,
+        splat_light: &splats.light,
         params: SplatParams { clip_from_world: pixel_view.clip_from_world.to_cols_array_2d(), eye: pixel_view.eye },
     };
     let clear = Load::Clear([0.0; 4]);

@@ -1,6 +1,7 @@
-//! A hierarchy over leaf elements: one leaf per vertex of a mesh, inner nodes of up to four children, depth-first order.
+//! A hierarchy over leaf elements: one leaf per vertex of a mesh or per patch of a flat part ([`Patches`]), inner nodes of up
+//! to four children, depth-first order.
 //!
-//! A leaf stands for both sides of its vertex's cell and sits at the cell's centre of area, so that no two leaves of
+//! A leaf stands for both sides of its vertices' cells and sits at their centre of area, so that no two leaves of
 //! neighbouring walls coincide on their common edge. Facets are kept apart first: a node above one facet alone holds
 //! leaves that look the same way, as a quadtree where they lie in a plane. The topology is made once ([`HierarchyPlan`]); places, areas
 //! and radii follow the world on the device ([`Hierarchy::place`]).
@@ -9,9 +10,10 @@ use super::elements::{BACK_SIDE, Elements, NO_ELEMENT};
 use super::levels::Levels;
 use super::world::World;
 use crate::gpu::shaders::hierarchy as passes;
-use crate::gpu::shaders::types::{HierarchyLeaf, HierarchyNode};
+use crate::gpu::shaders::types::{HierarchyLeaf, HierarchyNode, LeafShare};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::facets::Facets;
+use crate::scene::patches::Patches;
 use crate::scene::surfaces::Surfaces;
 use glam::Vec3;
 
@@ -37,6 +39,11 @@ pub struct HierarchyPlan {
     pub depths: Vec<u32>,
     /// Leaf of each element, front or back.
     pub leaf_of_element: Vec<u32>,
+    /// Vertices of each leaf, one leaf after the other.
+    pub members: Vec<u32>,
+    /// The leaves that each vertex takes light from, one vertex after the other, and where each vertex's start; one more.
+    pub shares: Vec<LeafShare>,
+    pub share_offsets: Vec<u32>,
 }
 
 /// What is behind surfaces.
@@ -51,33 +58,33 @@ pub enum Behind {
 }
 
 impl HierarchyPlan {
-    /// `positions`: world space at rest; `margin(vertex)`: how far the vertex may move from there, metres.
+    /// `patches` holds every vertex that has triangles; `margin(vertex)`: how far the vertex may move from its place at
+    /// rest, metres.
     pub fn new(
         elements: &Elements,
         surfaces: &Surfaces,
         facets: &Facets,
-        positions: &[Vec3],
+        patches: &Patches,
         behind: Behind,
         margin: impl Fn(u32) -> f32,
     ) -> Self {
         let topology = &elements.topology;
-        let vertices: Vec<u32> = (0..topology.back_elements.len() as u32)
-            .filter(|&vertex| !topology.incident.row(vertex).is_empty())
-            .collect();
-        let mut by_facet: Vec<Vec<u32>> = vec![Vec::new(); facets.is_flat.len()];
-        for &vertex in &vertices {
-            by_facet[facets.of_vertex[vertex as usize] as usize].push(vertex);
-        }
-        by_facet.retain(|facet| !facet.is_empty());
-        let centers: Vec<Vec3> = by_facet
+        let mut of_facet: Vec<&[u32]> = patches.of_facet.iter().map(Vec::as_slice).collect();
+        of_facet.retain(|own| !own.is_empty());
+        let world_place = |patch: u32| patches.world_places[patch as usize];
+        let centers: Vec<Vec3> = of_facet
             .iter()
-            .map(|facet| facet.iter().map(|&v| positions[v as usize]).sum::<Vec3>() / facet.len() as f32)
+            .map(|own| own.iter().map(|&patch| world_place(patch)).sum::<Vec3>() / own.len() as f32)
             .collect();
 
         let mut plan = Self { leaf_of_element: vec![NONE; topology.vertices.len()], ..Self::default() };
-        let mut order: Vec<u32> = (0..by_facet.len() as u32).collect();
-        let mut make = Maker { plan: &mut plan, positions };
-        let mut leaf = |plan: &mut Self, vertex: u32| {
+        let mut order: Vec<u32> = (0..of_facet.len() as u32).collect();
+        let mut leaf_of_patch = vec![NONE; patches.vertices.len()];
+        let mut make = Maker { plan: &mut plan, places: &patches.places };
+        let mut leaf = |plan: &mut Self, patch: u32| {
+            let own = &patches.vertices[patch as usize];
+            // Flat parts are of one material, and solid or not as a whole.
+            let vertex = patches.middle_of(patch);
             let surface = surfaces.of_vertex[vertex as usize];
             let back_element = topology.back_elements[vertex as usize];
             let blocks = match behind {
@@ -89,17 +96,21 @@ impl HierarchyPlan {
             if back_element != NO_ELEMENT {
                 flags |= REFLECTS_BEHIND;
             }
-            let node = plan.nodes.last_mut().expect("a leaf is added to its node");
-            node.leaf = plan.leaves.len() as u32;
-            node.shape = node.leaf;
+            let index = plan.leaves.len() as u32;
+            leaf_of_patch[patch as usize] = index;
             let facet = facets.of_vertex[vertex as usize];
+            let node = plan.nodes.last_mut().expect("a leaf is added to its node");
+            (node.leaf, node.shape) = (index, index);
             node.surface = if facets.is_flat[facet as usize] { facet } else { NONE };
-            node.margin = margin(vertex);
-            plan.leaf_of_element[vertex as usize] = node.leaf;
-            if back_element != NO_ELEMENT {
-                plan.leaf_of_element[back_element as usize] = node.leaf;
+            node.margin = own.iter().map(|&vertex| margin(vertex)).fold(0.0, f32::max);
+            for &vertex in own {
+                debug_assert_eq!(topology.vertices[vertex as usize] & BACK_SIDE, 0);
+                plan.leaf_of_element[vertex as usize] = index;
+                let back = topology.back_elements[vertex as usize];
+                if back != NO_ELEMENT {
+                    plan.leaf_of_element[back as usize] = index;
+                }
             }
-            debug_assert_eq!(topology.vertices[vertex as usize] & BACK_SIDE, 0);
             plan.leaves.push(HierarchyLeaf {
                 normal: Vec3::ZERO,
                 area: 0.0,
@@ -107,13 +118,29 @@ impl HierarchyPlan {
                 element: vertex,
                 back_element,
                 flags,
+                first_member: plan.members.len() as u32,
+                member_count: own.len() as u32,
+                along: patches.along[facet as usize],
             });
+            plan.members.extend(own);
         };
         if !order.is_empty() {
-            make.facets(&mut order, &centers, &mut by_facet, (NONE, 0), &mut leaf);
+            make.facets(&mut order, &centers, &of_facet, (NONE, 0), &mut leaf);
         }
         plan.share_upwards(facets);
+        plan.share_offsets.push(0);
+        for shares in &patches.shares {
+            let leaves = shares.iter().map(|&(patch, share)| LeafShare { leaf: leaf_of_patch[patch as usize], share });
+            plan.shares.extend(leaves);
+            plan.share_offsets.push(plan.shares.len() as u32);
+        }
         plan
+    }
+
+    /// Vertices of a leaf.
+    pub fn members_of(&self, leaf: u32) -> &[u32] {
+        let own = &self.leaves[leaf as usize];
+        &self.members[own.first_member as usize..][..own.member_count as usize]
     }
 
     /// Inner nodes take over what all their children share.
@@ -156,7 +183,8 @@ impl HierarchyPlan {
 /// Builds nodes depth first.
 struct Maker<'a> {
     plan: &'a mut HierarchyPlan,
-    positions: &'a [Vec3],
+    /// Of each patch.
+    places: &'a [Vec3],
 }
 
 impl Maker<'_> {
@@ -188,30 +216,29 @@ impl Maker<'_> {
         &mut self,
         order: &mut [u32],
         centers: &[Vec3],
-        by_facet: &mut [Vec<u32>],
+        of_facet: &[&[u32]],
         above: (u32, u32),
         leaf: &mut impl FnMut(&mut HierarchyPlan, u32),
     ) {
         if let [facet] = *order {
-            let mut vertices = std::mem::take(&mut by_facet[facet as usize]);
-            return self.vertices(&mut vertices, above, leaf);
+            return self.patches(&mut of_facet[facet as usize].to_vec(), above, leaf);
         }
         let node = self.open(above);
         for part in quarters(order, centers, above.1) {
-            self.facets(part, centers, by_facet, (node, above.1 + 1), leaf);
+            self.facets(part, centers, of_facet, (node, above.1 + 1), leaf);
         }
         self.close(node);
     }
 
     /// The subtree of leaves of one facet.
-    fn vertices(&mut self, vertices: &mut [u32], above: (u32, u32), leaf: &mut impl FnMut(&mut HierarchyPlan, u32)) {
+    fn patches(&mut self, patches: &mut [u32], above: (u32, u32), leaf: &mut impl FnMut(&mut HierarchyPlan, u32)) {
         let node = self.open(above);
-        if let [vertex] = *vertices {
-            return leaf(self.plan, vertex);
+        if let [patch] = *patches {
+            return leaf(self.plan, patch);
         }
-        let positions = self.positions;
-        for part in quarters(vertices, positions, above.1) {
-            self.vertices(part, (node, above.1 + 1), leaf);
+        let places = self.places;
+        for part in quarters(patches, places, above.1) {
+            self.patches(part, (node, above.1 + 1), leaf);
         }
         self.close(node);
     }
@@ -253,6 +280,10 @@ pub struct Hierarchy {
     pub plan: HierarchyPlan,
     pub nodes: Buffer<HierarchyNode>,
     pub leaves: Buffer<HierarchyLeaf>,
+    /// See [`HierarchyPlan::members`] and [`HierarchyPlan::shares`].
+    pub members: Buffer<u32>,
+    pub shares: Buffer<LeafShare>,
+    pub share_offsets: Buffer<u32>,
     /// Of inner nodes.
     pub levels: Levels,
 }
@@ -263,6 +294,9 @@ impl Hierarchy {
         let hierarchy = Self {
             nodes: context.upload("hierarchy/nodes", &plan.nodes)?,
             leaves: context.upload("hierarchy/leaves", &plan.leaves)?,
+            members: context.upload("hierarchy/members", &plan.members)?,
+            shares: context.upload("hierarchy/shares", &plan.shares)?,
+            share_offsets: context.upload("hierarchy/share offsets", &plan.share_offsets)?,
             levels: Levels::new(context, "hierarchy", &plan.depths, |node| plan.nodes[node as usize].leaf == NONE)?,
             plan,
         };
@@ -289,6 +323,7 @@ impl Hierarchy {
             triangles: &world.triangles,
             incident_offsets: &elements.incident_offsets,
             incident_triangles: &elements.incident_triangles,
+            members: &self.members,
             leaves: &self.leaves,
             nodes: &self.nodes,
             params: passes::PlaceLeavesParams { leaf_count },

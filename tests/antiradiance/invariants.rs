@@ -7,7 +7,7 @@ use crate::support::{prepare, settings};
 use crate::twins;
 use glam::{UVec2, Vec3};
 use linklight::gpu::shaders::types::HierarchyNode;
-use linklight::methods::antiradiance::{Antiradiance, AntiradianceError, BinCount, Settings};
+use linklight::methods::antiradiance::{Antiradiance, AntiradianceError, BinCount, Leaves, Settings};
 use linklight::scene::Scene;
 use linklight::stages::hierarchy::NONE;
 
@@ -56,8 +56,8 @@ fn wrongly_covered(nodes: &[HierarchyNode], links: &[UVec2]) -> usize {
     (0..cover.len()).filter(|&k| cover[k] != expected(k / leaves.len(), k % leaves.len())).count()
 }
 
-fn validate(context: &TestContext, name: &str, fixture: &Fixture) {
-    let method = prepare(context, fixture, settings(128));
+fn validate(context: &TestContext, name: &str, fixture: &Fixture, settings: Settings) {
+    let method = prepare(context, fixture, settings);
     let hierarchy = method.hierarchy();
     let nodes = context.download(&hierarchy.nodes).unwrap();
     let leaves = context.download(&hierarchy.leaves).unwrap();
@@ -96,10 +96,13 @@ fn validate(context: &TestContext, name: &str, fixture: &Fixture) {
 fn every_pair_of_leaves_is_covered_once() {
     let context = TestContext::new();
     for (name, edge) in [("cornell-box", 0.9), ("two-rooms", 1.6)] {
-        validate(&context, name, &Fixture::new(&context, builtin_scene(name), Some(edge)));
+        let fixture = Fixture::new(&context, builtin_scene(name), Some(edge));
+        validate(&context, name, &fixture, settings(128));
+        let by_patches = Settings { leaves: Leaves::Patches, patch_side: 0.1, ..settings(128) };
+        validate(&context, name, &fixture, by_patches);
     }
     for seed in 0..3 {
-        validate(&context, "heap", &Fixture::new(&context, heap(seed), None));
+        validate(&context, "heap", &Fixture::new(&context, heap(seed), None), settings(128));
     }
 }
 

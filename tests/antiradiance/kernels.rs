@@ -100,7 +100,7 @@ fn a_step_agrees_with_its_twin() {
 
         let mut recorder = context.recorder("test").unwrap();
         let step = LocalStep { reflects: true, ..LocalStep::default() };
-        tables.step(&mut recorder, method.transfers(), hierarchy, bins, method.elements(), step);
+        tables.step(&mut recorder, method.transfers(), hierarchy, bins, step);
         recorder.submit().unwrap();
 
         let m = bins.bins.count() as usize;

@@ -27,13 +27,17 @@ fn splats_reproduce_even_and_linear_light() {
     let view = View::towards(Vec3::new(0.01, 4.0, 0.0), Vec3::ZERO, 1.0, UVec2::splat(SIZE));
     let pose = Pose::rest(&fixture.scene);
     let splats = context.download(&method.splats().splats).unwrap();
+    let shares = context.download(&method.splats().shares).unwrap();
+    assert!(splats.iter().all(|splat| splat.share_count == 1));
     let sums = SplatSums::new(&context, SIZE, SIZE).unwrap();
     let (g_buffer, shadow_maps) =
         (GBuffer::new(&context, SIZE, SIZE).unwrap(), ShadowMaps::new(&context, &pose).unwrap());
     let film = Film::new(&context, SIZE, SIZE).unwrap();
     let shown = |light: &dyn Fn(Vec3) -> f32| {
         let mut irradiance = vec![Vec3::ZERO; method.elements().count as usize];
-        splats.iter().for_each(|splat| irradiance[splat.element as usize] = Vec3::splat(light(splat.center)));
+        splats.iter().for_each(|splat| {
+            irradiance[shares[splat.first_share as usize].vertex as usize] = Vec3::splat(light(splat.center))
+        });
         let irradiance = context.upload("test/irradiance", &irradiance).unwrap();
         let mut recorder = context.recorder("test").unwrap();
         let vertices = VertexLight {

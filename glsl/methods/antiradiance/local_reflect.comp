@@ -4,13 +4,13 @@
 
 // One thread per leaf: its irradiance from the parts, and what its sides reflect of it.     [Dachsbacher2007 4.2 local pass, Eq. 18]
 // reads parts[part_count * 2 * leaf_count] (W/m2), leaves, source[2 leaf_count] (radiosity that needs no transport, W/m2, front
-//       and back), albedo[element_count]
+//       and back), leaf_albedo[2 leaf_count]
 // updates radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1)   writes irradiance[2 leaf_count] (W/m2)   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Parts { vec3 parts[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Source { vec3 source[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer LeafAlbedo { vec3 leaf_albedo[]; };
 layout(set = 0, binding = 4, scalar) buffer Radiosity { vec3 radiosity[]; };
 layout(set = 0, binding = 5, scalar) buffer Means { vec3 means[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
@@ -27,8 +27,7 @@ void main()
 {
     uint leaf = linear_index();
     if (leaf >= params.leaf_count) return;
-    HierarchyLeaf own = leaves[leaf];
-    bool reflects_behind = (own.flags & REFLECTS_BEHIND) != 0;
+    bool reflects_behind = (leaves[leaf].flags & REFLECTS_BEHIND) != 0;
     vec3 front = vec3(0.0), back = vec3(0.0);
     for (uint part = 0; part < params.part_count; ++part) {
         front += parts[2 * part * params.leaf_count + leaf];
@@ -42,6 +41,6 @@ void main()
     irradiance[2 * leaf] = front;
     irradiance[2 * leaf + 1] = back;
     if (params.update_radiosity == 0) return;
-    radiosity[2 * leaf] = source[2 * leaf] + albedo[own.element] * front;
-    radiosity[2 * leaf + 1] = source[2 * leaf + 1] + (reflects_behind ? albedo[own.back_element] * back : vec3(0.0));
+    radiosity[2 * leaf] = source[2 * leaf] + leaf_albedo[2 * leaf] * front;
+    radiosity[2 * leaf + 1] = source[2 * leaf + 1] + (reflects_behind ? leaf_albedo[2 * leaf + 1] * back : vec3(0.0));
 }

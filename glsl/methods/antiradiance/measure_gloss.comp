@@ -5,8 +5,8 @@
 #include "lib/leaf_gloss.glsl"
 #include "lib/material.glsl"
 
-// One thread per leaf: its specular lobe, averaged over the triangles around its vertex.
-// reads leaves[leaf_count], triangles, triangle_materials, incident_offsets[vertex_count + 1], incident_triangles, positions,
+// One thread per leaf: its specular lobe, averaged over the triangles around its vertices.
+// reads leaves[leaf_count], members, triangles, triangle_materials, incident_offsets[vertex_count + 1], incident_triangles, positions,
 // attributes, materials   writes gloss[leaf_count]   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
@@ -18,6 +18,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer Positions { vec3 positions[
 layout(set = 0, binding = 6, scalar) readonly buffer Attributes { VertexAttributes attributes[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer Materials { Material materials[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Gloss { LeafGloss gloss[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Members { uint members[]; };
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
 
@@ -32,22 +33,25 @@ void main()
 {
     uint leaf = linear_index();
     if (leaf >= params.leaf_count) return;
-    uint vertex = leaves[leaf].element;
+    uint first = leaves[leaf].first_member, last = first + leaves[leaf].member_count;
     LeafGloss mean = LeafGloss(vec3(0.0), 0.0, 0.0);
     float area_sum = 0.0;
-    for (uint k = incident_offsets[vertex]; k < incident_offsets[vertex + 1]; ++k) {
-        uint triangle = incident_triangles[k];
-        uvec3 v = triangles[triangle];
-        vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
-        float area = length(cross(b - a, c - a));
-        vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
-        VertexAttributes at = interpolated(attributes[v.x], attributes[v.y], attributes[v.z], w);
-        Surface s = surface_of(materials[triangle_materials[triangle]], at, vec3(0.0, 0.0, 1.0), vec4(1.0, 0.0, 0.0, 1.0), false);
-        if (!s.reflects) continue;
-        mean.f0 += area * s.f0;
-        mean.f90 += area * s.f90;
-        mean.alpha += area * s.alpha;
-        area_sum += area;
+    for (uint member = first; member < last; ++member) {
+        uint vertex = members[member];
+        for (uint k = incident_offsets[vertex]; k < incident_offsets[vertex + 1]; ++k) {
+            uint triangle = incident_triangles[k];
+            uvec3 v = triangles[triangle];
+            vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
+            float area = length(cross(b - a, c - a));
+            vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
+            VertexAttributes at = interpolated(attributes[v.x], attributes[v.y], attributes[v.z], w);
+            Surface s = surface_of(materials[triangle_materials[triangle]], at, vec3(0.0, 0.0, 1.0), vec4(1.0, 0.0, 0.0, 1.0), false);
+            if (!s.reflects) continue;
+            mean.f0 += area * s.f0;
+            mean.f90 += area * s.f90;
+            mean.alpha += area * s.alpha;
+            area_sum += area;
+        }
     }
     float inverse = area_sum > 0.0 ? 1.0 / area_sum : 0.0;
     gloss[leaf] = LeafGloss(mean.f0 * inverse, mean.f90 * inverse, mean.alpha * inverse);

@@ -8,8 +8,8 @@
 #include "lib/light.glsl"
 
 // One thread per (glossy leaf, bin): radiance that its specular lobe sends along the bin of the light of punctual lights and
-// sampled emitters, which comes along no link.                                    [Dachsbacher2007 3.3, 4.2 local pass, Eq. 18]
-// reads glossy_leaves[glossy_count], leaves, gloss, bin_directions, element_positions[element_count] (m), lights[light_count],
+// sampled emitters, which comes along no link; the mean over its members by area.                                    [Dachsbacher2007 3.3, 4.2 local pass, Eq. 18]
+// reads glossy_leaves[glossy_count], leaves, members, back_elements[vertex_count], area[element_count] (m2), gloss, bin_directions, element_positions[element_count] (m), lights[light_count],
 // visibility[light_count * element_count], samples[sample_count], triangles, positions, emission[element_count] (W m^-2 sr^-1),
 // visible[element_count * ceil(sample_count / 32)] (bits)   updates base[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
@@ -27,6 +27,9 @@ layout(set = 0, binding = 9, scalar) readonly buffer Positions { vec3 positions[
 layout(set = 0, binding = 10, scalar) readonly buffer Emission { vec3 emission[]; };
 layout(set = 0, binding = 11, scalar) readonly buffer Visible { uint visible[]; };
 layout(set = 0, binding = 12, scalar) buffer Base { vec3 base[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Members { uint members[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer BackElements { uint back_elements[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Area { float area[]; };
 layout(push_constant, scalar) uniform Params {
     uint glossy_count;
     uint element_count;
@@ -39,19 +42,9 @@ layout(push_constant, scalar) uniform Params {
 // Of the lobe towards the bin's direction, 1/sr, times the cosine towards the light.
 vec3 lobe(Surface s, vec3 to_eye, vec3 to_light) { return brdf_value(s, to_eye, to_light) * max(dot(s.normal, to_light), 0.0); }
 
-void main()
+vec3 sent(uint element, Surface s, vec3 w)
 {
-    uint i = linear_index();
-    if (i >= params.glossy_count * BIN_COUNT) return;
-    uint leaf = glossy_leaves[i / BIN_COUNT];
-    HierarchyLeaf own = leaves[leaf];
-    vec3 w = bin_directions[i % BIN_COUNT];
-    bool leaves_front = dot(own.normal, w) > 0.0;
-    uint element = leaves_front ? own.element : own.back_element;
-    if (element == NONE) return;
-    Surface s = glossy_surface(gloss[leaf], leaves_front ? own.normal : -own.normal);
     vec3 position = element_positions[element], sum = vec3(0.0);
-
     for (uint light = 0; light < params.light_count; ++light) {
         vec3 to_light;
         float distance_to_light;
@@ -73,5 +66,25 @@ void main()
         float solid_angle = max(emitter_cosine(at, point, -to_light), 0.0) * point.area / (squared + point.area / PI);
         sum += solid_angle * radiance * lobe(s, w, to_light);
     }
-    base[i] += sum;
+    return sum;
+}
+
+void main()
+{
+    uint i = linear_index();
+    if (i >= params.glossy_count * BIN_COUNT) return;
+    uint leaf = glossy_leaves[i / BIN_COUNT];
+    HierarchyLeaf own = leaves[leaf];
+    vec3 w = bin_directions[i % BIN_COUNT];
+    bool leaves_front = dot(own.normal, w) > 0.0;
+    if (!leaves_front && own.back_element == NONE) return;
+    Surface s = glossy_surface(gloss[leaf], leaves_front ? own.normal : -own.normal);
+    vec3 sum = vec3(0.0);
+    float area_sum = 0.0;
+    for (uint member = own.first_member; member < own.first_member + own.member_count; ++member) {
+        uint vertex = members[member];
+        sum += area[vertex] * sent(leaves_front ? vertex : back_elements[vertex], s, w);
+        area_sum += area[vertex];
+    }
+    base[i] += area_sum > 0.0 ? sum / area_sum : vec3(0.0);
 }

@@ -8,7 +8,7 @@
 // One thread per glossy leaf: the irradiance that, reflected evenly as the display does, gives what its specular lobe sends
 // to the eye besides its diffuse light.
 // reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, peaks, incident, positions,
-// albedo,
+// albedo, members, back_elements[vertex_count],
 // irradiance[element_count] (W/m2)   updates shown[element_count] (W/m2; of glossy leaves)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -26,6 +26,8 @@ layout(set = 0, binding = 9, scalar) readonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer Peaks { float peaks[]; };
+layout(set = 0, binding = 13, scalar) readonly buffer Members { uint members[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer BackElements { uint back_elements[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0.
 layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; uint leaf_count; uint node_count; float undershoot; } params;
 
@@ -41,14 +43,18 @@ void main()
     vec3 offset = params.eye.w == 0.0 ? params.eye.xyz : params.eye.xyz - positions[leaves[leaf].element];
     vec3 to_eye = offset / max(length(offset), 1e-20), normal = leaves[leaf].normal;
     bool sees_front = dot(normal, to_eye) > 0.0;
-    uint element = sees_front ? leaves[leaf].element : leaves[leaf].back_element;
-    if (element == NONE) return;
+    if (!sees_front && leaves[leaf].back_element == NONE) return;
 
     // What the display multiplies with: the surface's own lobe, not the widened one.
     Surface s = glossy_surface(gloss[leaf], sees_front ? normal : -normal);
     s.alpha = gloss[leaf].alpha;
-    s.albedo = albedo[element];
     float cos_eye = dot(s.normal, to_eye);
-    vec3 sent = diffuse_albedo(s, cos_eye) * irradiance[element] + PI * glossy_radiance(leaf, to_eye);
-    shown[element] = sent / max(even_albedo(s, cos_eye), vec3(1e-4));
+    vec3 glossy = PI * glossy_radiance(leaf, to_eye);
+    uint first = leaves[leaf].first_member, last = first + leaves[leaf].member_count;
+    for (uint member = first; member < last; ++member) {
+        uint element = sees_front ? members[member] : back_elements[members[member]];
+        s.albedo = albedo[element];
+        vec3 sent = diffuse_albedo(s, cos_eye) * irradiance[element] + glossy;
+        shown[element] = sent / max(even_albedo(s, cos_eye), vec3(1e-4));
+    }
 }

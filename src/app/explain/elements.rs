@@ -14,7 +14,7 @@ use crate::display::direct::Canvas;
 use crate::display::splat::{self, SplatLight};
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Buffer;
-use crate::gpu::shaders::types::Splat;
+use crate::gpu::shaders::types::{Splat, SplatShare};
 use crate::methods::carried::{Carried, Sender};
 use crate::report::explanation::Light;
 use crate::stages::elements::{BACK_SIDE, Elements, NO_ELEMENT};
@@ -127,8 +127,9 @@ fn weights(
     let patches = match (splat_sums, method.splats()) {
         (Some(sums), Some(splats)) => {
             let rectangles = context.download(&splats.splats)?;
+            let members = context.download(&splats.shares)?;
             let surfaces = context.download(&splats.triangle_surfaces)?;
-            Some((SplatLight { vertices: light, splats, sums }, rectangles, surfaces))
+            Some((SplatLight { vertices: light, splats, sums }, rectangles, members, surfaces))
         }
         _ => None,
     };
@@ -147,9 +148,9 @@ fn weights(
             Some((light, ..)) => splat::add(recorder, *light, canvas, view, weight),
             None => vertex::add(recorder, light, canvas, view, weight),
         })?;
-        let by_patches = patches
-            .as_ref()
-            .and_then(|(_, splats, surfaces)| of_splats(splats, surfaces[triangle as usize], &seen, stage));
+        let by_patches = patches.as_ref().and_then(|(_, splats, members, surfaces)| {
+            of_splats(splats, members, surfaces[triangle as usize], &seen, elements)
+        });
         let shares = by_patches.unwrap_or_else(|| of_corners(&probe, triangle, &seen, elements));
         for (element, share) in shares {
             *weights.entry(element).or_default() += f64::from(share) * reflectance;
@@ -166,8 +167,15 @@ fn of_corners(probe: &Probe<'_>, triangle: u32, seen: &Seen, elements: &Elements
     of.into_iter().zip(seen.weights).collect()
 }
 
-/// As `display/splat` and `display/splat_normalize` share between patches; `None` where none reaches.
-fn of_splats(splats: &[Splat], surface: u32, seen: &Seen, stage: &Stage) -> Option<Vec<(u32, f32)>> {
+/// As `display/splat` and `display/splat_normalize` share between patches, and `display/splat_light` between their vertices;
+/// `None` where none reaches.
+fn of_splats(
+    splats: &[Splat],
+    members: &[SplatShare],
+    surface: u32,
+    seen: &Seen,
+    elements: &Elements,
+) -> Option<Vec<(u32, f32)>> {
     let eye = seen.view.eye;
     let mut shares: Vec<(u32, f32)> = Vec::new();
     for splat in splats.iter().filter(|splat| splat.surface == surface) {
@@ -179,13 +187,16 @@ fn of_splats(splats: &[Splat], surface: u32, seen: &Seen, stage: &Stage) -> Opti
         if weight > 0.0 {
             let eye_at = Vec3::from_slice(&eye);
             let to_eye = if eye[3] == 0.0 { eye_at } else { eye_at - splat.center };
-            let sees_back = u.cross(v).dot(to_eye) < 0.0 && splat.back_element != NO_ELEMENT;
-            shares.push((if sees_back { splat.back_element } else { splat.element }, weight));
+            let sees_back = u.cross(v).dot(to_eye) < 0.0;
+            let own = &members[splat.first_share as usize..][..splat.share_count as usize];
+            shares.extend(own.iter().map(|member| {
+                let back = elements.topology.back_elements[member.vertex as usize];
+                (if sees_back && back != NO_ELEMENT { back } else { member.vertex }, weight * member.share)
+            }));
         }
     }
     let sum: f32 = shares.iter().map(|(_, weight)| weight).sum();
     shares.iter_mut().for_each(|(_, weight)| *weight /= sum);
-    debug_assert!(stage.world.triangle_count > 0);
     (sum > 0.0).then_some(shares)
 }
 

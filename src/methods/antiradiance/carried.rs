@@ -5,6 +5,7 @@ use super::views::entry;
 use super::{Antiradiance, Tables};
 use crate::gpu::{Buffer, Context, GpuError};
 use crate::methods::carried::{Carried, Sender};
+use crate::stages::elements::BACK_SIDE;
 use crate::stages::hierarchy::NONE;
 use glam::Vec3;
 use std::collections::{BTreeMap, HashMap};
@@ -32,10 +33,12 @@ impl Antiradiance {
         let Some(kept) = &self.kept else { return Ok(vec![Vec::new(); elements.len()]) };
         let node_count = self.hierarchy.node_count() as usize;
         let (bins, words) = (&self.bins.bins, Tables::words(self.tables.half) as usize);
-        let receivers: Vec<Option<Receiver>> = elements.iter().map(|&element| self.receiver(element)).collect();
+        let takes: Vec<Vec<(Side, f32)>> = elements.iter().map(|&element| self.takes(element)).collect();
+        let receivers: BTreeMap<Side, Receiver> =
+            takes.iter().flatten().map(|&(side, _)| (side, self.receiver(side))).collect();
 
         let mut cells: HashMap<u32, Vec<(u32, f32)>> = HashMap::new();
-        for receiver in receivers.iter().flatten() {
+        for receiver in receivers.values() {
             for bin in 0..bins.count() {
                 cells.extend(receiver.nodes.iter().map(|node| (bin * node_count as u32 + node, Vec::new())));
             }
@@ -46,12 +49,8 @@ impl Antiradiance {
         let (leaves, norms) = (context.download(&self.hierarchy.leaves)?, context.download(&self.tables.cosine_norms)?);
         let of = |table: &[u64], at: usize| entry(&table[at * words..(at + 1) * words]);
 
-        let mut all = Vec::with_capacity(elements.len());
-        for receiver in receivers {
-            let Some(Receiver { leaf, nodes, is_back }) = receiver else {
-                all.push(Vec::new());
-                continue;
-            };
+        let mut of_sides: BTreeMap<Side, (BTreeMap<u32, Vec3>, Vec3)> = BTreeMap::new();
+        for (side, Receiver { leaf, nodes, is_back }) in receivers {
             let (normal, mean) = (leaves[leaf].normal, means[2 * leaf + usize::from(is_back)]);
             let mut senders: BTreeMap<u32, Vec3> = BTreeMap::new();
             let mut floor = Vec3::ZERO;
@@ -76,27 +75,43 @@ impl Antiradiance {
                 let mut arrived: Vec3 = held.sum();
                 if !kept.step.sets_floor {
                     let peak = peaks[bin * leaves.len() + leaf].max(1.0);
-                    arrived = arrived.max(-kept.step.bounced * self.tables.undershoot * peak * mean);
+                    let undershoot = if kept.step.cuts { 0.0 } else { kept.step.bounced * self.tables.undershoot };
+                    arrived = arrived.max(-undershoot * peak * mean);
                 }
                 floor += weight * (arrived - told);
             }
             let sum = senders.values().sum::<Vec3>() + floor;
             floor += sum.max(Vec3::ZERO) - sum;
-            let carried = |(&node, &irradiance): (&u32, &Vec3)| Carried { from: self.sender(node), irradiance };
-            let mut of_element: Vec<Carried> = senders.iter().map(carried).collect();
-            of_element.push(Carried { from: Sender::Floor, irradiance: floor });
-            all.push(of_element);
+            of_sides.insert(side, (senders, floor));
         }
-        Ok(all)
+        let of_element = |takes: &Vec<(Side, f32)>| {
+            let (mut senders, mut floor): (BTreeMap<u32, Vec3>, _) = (BTreeMap::new(), Vec3::ZERO);
+            for (side, share) in takes {
+                let (own, own_floor) = &of_sides[side];
+                own.iter().for_each(|(&node, &sent)| *senders.entry(node).or_default() += *share * sent);
+                floor += *share * *own_floor;
+            }
+            let carried = |(node, irradiance)| Carried { from: self.sender(node), irradiance };
+            let floor = (!takes.is_empty()).then_some(Carried { from: Sender::Floor, irradiance: floor });
+            senders.into_iter().map(carried).chain(floor).collect()
+        };
+        Ok(takes.iter().map(of_element).collect())
     }
 
-    fn receiver(&self, element: u32) -> Option<Receiver> {
+    /// The leaves that an element takes light from, as `to_elements` does, and its shares of them.
+    fn takes(&self, element: u32) -> Vec<(Side, f32)> {
         let plan = &self.hierarchy.plan;
-        let leaf = *plan.leaf_of_element.get(element as usize).filter(|&&leaf| leaf != NONE)?;
-        let own = &plan.leaves[leaf as usize];
+        let Some(&entry) = self.elements.topology.vertices.get(element as usize) else { return Vec::new() };
+        let vertex = (entry & !BACK_SIDE) as usize;
+        let own = plan.share_offsets[vertex] as usize..plan.share_offsets[vertex + 1] as usize;
+        plan.shares[own].iter().map(|own| ((own.leaf, entry & BACK_SIDE != 0), own.share)).collect()
+    }
+
+    fn receiver(&self, (leaf, is_back): Side) -> Receiver {
+        let plan = &self.hierarchy.plan;
         let above = |node: &u32| Some(plan.nodes[*node as usize].parent).filter(|&parent| parent != NONE);
-        let nodes = std::iter::successors(Some(own.node), above).collect();
-        Some(Receiver { leaf: leaf as usize, nodes, is_back: own.back_element == element })
+        let nodes = std::iter::successors(Some(plan.leaves[leaf as usize].node), above).collect();
+        Receiver { leaf: leaf as usize, nodes, is_back }
     }
 
     fn sender(&self, node: u32) -> Sender {
@@ -111,7 +126,10 @@ impl Antiradiance {
     }
 }
 
-/// An element, as light arrives at it.
+/// A leaf, and whether its back is meant.
+type Side = (u32, bool);
+
+/// A side of a leaf, as light arrives at it.
 struct Receiver {
     leaf: usize,
     /// The leaf's own, its parent, and so on up.

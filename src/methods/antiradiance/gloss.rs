@@ -116,6 +116,7 @@ pub(super) fn measure(
     let leaf_count = hierarchy.leaf_count();
     let pass = passes::MeasureGloss {
         leaves: &hierarchy.leaves,
+        members: &hierarchy.members,
         triangles: &world.triangles,
         triangle_materials: &world.triangle_materials,
         incident_offsets: &elements.incident_offsets,
@@ -147,6 +148,9 @@ impl Antiradiance {
             positions: &world.positions,
             emission: &elements.emission,
             visible: &emitters.visible,
+            members: &self.hierarchy.members,
+            back_elements: &elements.back_elements,
+            area: &elements.area,
             base: &gloss.base,
             constants: passes::ReflectDirectConstants { bin_count: self.tables.bin_count },
             params: passes::ReflectDirectParams {
@@ -184,6 +188,8 @@ impl Antiradiance {
             positions: &world.positions,
             albedo: &self.elements.albedo,
             irradiance: self.indirect_irradiance(),
+            members: &self.hierarchy.members,
+            back_elements: &self.elements.back_elements,
             shown,
             constants: passes::ToEyeConstants { words: Tables::words(tables.half) as u32, bin_count: tables.bin_count },
             params: passes::ToEyeParams {

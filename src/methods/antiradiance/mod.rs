@@ -30,7 +30,8 @@
 //! samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance may not fall
 //! far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes are nodes of their
 //! own; near senders are discs, never more than
-//! half of the sphere; links are made on the device. The patches of flat parts are the cells of their vertices. Direct light of punctual lights and sampled emitters is that of shadow rays.
+//! half of the sphere; links are made on the device. A patch of a flat part is made of the cells of its vertices, one or many
+//! ([`Settings::leaves`]). Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
 //!
@@ -51,7 +52,7 @@ pub use gloss::Gloss;
 pub use linking::{LinkingError, NodeLinks, TransferWindow, Transfers, link_solid_angle};
 pub use report::Report;
 pub use scheme::{Residual, growth_rate};
-pub use settings::{Backs, Scheme, Settings};
+pub use settings::{Backs, Leaves, Scheme, Settings};
 pub use tables::{LocalStep, Tables, binned};
 pub use views::{DebugView, half};
 
@@ -60,6 +61,7 @@ use crate::gpu::shaders::methods::antiradiance as passes;
 use crate::gpu::shaders::types::Ray;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::facets::Facets;
+use crate::scene::patches::Patches;
 use crate::scene::surfaces::Surfaces;
 use crate::stages::direction_bins::DeviceBins;
 use crate::stages::elements::{ElementTopology, Elements};
@@ -166,10 +168,11 @@ impl Antiradiance {
             let part = stage.geometry.vertex_part[vertex as usize];
             if moves[part as usize] { settings.motion_margin } else { 0.0 }
         };
-        let plan = HierarchyPlan::new(&elements, &surfaces, &facets, stage.rest_positions, behind, margin);
+        let patches = patches(stage, &elements, &facets, &settings);
+        let plan = HierarchyPlan::new(&elements, &surfaces, &facets, &patches, behind, margin);
         let budget = check_memory(context, &plan, &settings, budget)?;
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
-        let splats = Splats::new(context, &hierarchy, &facets, stage.geometry)?;
+        let splats = Splats::new(context, &hierarchy, &facets, stage.geometry, &elements)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
         let (bin_count, threshold) = (settings.bins.get(), settings.gloss_threshold);
         let gloss = Gloss::new(context, &hierarchy, &elements, stage.world, threshold, bin_count)?;
@@ -177,6 +180,7 @@ impl Antiradiance {
         let tables = Tables::new(context, &hierarchy, &bins, stage.environment, half, undershoot, gloss)?;
         let mut recorder = context.recorder("antiradiance")?;
         tables.update_norms(&mut recorder, &hierarchy, &bins);
+        tables.update_albedo(&mut recorder, &hierarchy, &elements);
         recorder.submit()?;
 
         let links = NodeLinks::refine(context, &hierarchy, link_solid_angle(&settings), budget)?;
@@ -217,6 +221,7 @@ impl Antiradiance {
         self.hierarchy.place(&mut recorder, &self.elements, stage.world);
         self.splats.place(&mut recorder, &self.hierarchy);
         self.tables.update_norms(&mut recorder, &self.hierarchy, &self.bins);
+        self.tables.update_albedo(&mut recorder, &self.hierarchy, &self.elements);
         recorder.submit()?;
         if !standing_links {
             self.links = NodeLinks::refine(context, &self.hierarchy, link_solid_angle(&self.settings), u64::MAX)?;
@@ -254,6 +259,7 @@ impl Antiradiance {
     /// Takes over the world's present materials: no link work. Which leaves are glossy stays.
     pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
         self.elements.update_materials(recorder, world);
+        self.tables.update_albedo(recorder, &self.hierarchy, &self.elements);
         gloss::measure(recorder, &self.hierarchy, &self.elements, world, &self.tables.gloss.lobes);
     }
 
@@ -299,6 +305,9 @@ impl Antiradiance {
         let leaf_count = self.hierarchy.leaf_count();
         let pass = passes::Sources {
             leaves: &self.hierarchy.leaves,
+            members: &self.hierarchy.members,
+            back_elements: &self.elements.back_elements,
+            area: &self.elements.area,
             albedo: &self.elements.albedo,
             emission: &self.elements.emission,
             is_sampled: &self.emitters.is_sampled,
@@ -312,15 +321,16 @@ impl Antiradiance {
     }
 
     fn to_elements(&self, recorder: &mut Recorder<'_>, leaf_irradiance: &Buffer<Vec3>, irradiance: &Buffer<Vec3>) {
-        let leaf_count = self.hierarchy.leaf_count();
-        recorder.fill(irradiance, 0);
+        let vertex_count = self.elements.back_elements.len() as u32;
         let pass = passes::ToElements {
-            leaves: &self.hierarchy.leaves,
+            share_offsets: &self.hierarchy.share_offsets,
+            shares: &self.hierarchy.shares,
+            back_elements: &self.elements.back_elements,
             leaf_irradiance,
             irradiance,
-            params: passes::ToElementsParams { leaf_count },
+            params: passes::ToElementsParams { vertex_count },
         };
-        recorder.dispatch(&pass, leaf_count);
+        recorder.dispatch(&pass, vertex_count);
     }
 
     /// Sum over bounces, smoothed if the settings say so; W/m2 per element.
@@ -427,6 +437,20 @@ fn check_memory(
         return refuse("the tables", needed, available);
     }
     Ok(budget - needed)
+}
+
+/// Which vertices make a leaf together.                                                     [Dachsbacher2007 3.1, 4.3]
+fn patches(stage: &Stage<'_>, elements: &Elements, facets: &Facets, settings: &Settings) -> Patches {
+    let positions = stage.rest_positions;
+    let incident = &elements.topology.incident;
+    let vertices: Vec<u32> = (0..incident.row_count()).filter(|&vertex| !incident.row(vertex).is_empty()).collect();
+    match settings.leaves {
+        Leaves::Vertices => Patches::of_vertices(&vertices, positions, facets),
+        Leaves::Patches => {
+            let (low, high) = positions.iter().fold((Vec3::MAX, Vec3::MIN), |(a, b), &p| (a.min(p), b.max(p)));
+            Patches::of_squares(&vertices, positions, facets, settings.patch_side * (high - low).length())
+        }
+    }
 }
 
 /// Per part: whether an animation moves it.

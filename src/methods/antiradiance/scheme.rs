@@ -16,6 +16,12 @@ const LEAST_CHANGE: f64 = 1e-3;
 const LEAST_DAMPING: f32 = 1.0 / 16.0;
 /// Steps of antiradiance alone that may rise unwatched: as many as surfaces stand one behind the other, errors grow first.
 const FREE_STEPS: usize = 8;
+/// Steps after the first of a bounce in which nothing falls below zero, while each changes more than a share of the light: they
+/// bring antiradiance near to where it settles, so that what then swings is small.
+const CUT_STEPS: u32 = 3;
+const CUT_ABOVE: f64 = 0.02;
+/// From this undershoot on they are as all others.
+const NEVER_CUTS: f32 = 1e6;
 /// Bounds what [`LocalStep::bounced`] grows to.
 const MOST_BOUNCED: f64 = 1e6;
 
@@ -82,7 +88,7 @@ impl Antiradiance {
         }
         recorder.scope("linked direct light", |recorder| {
             self.sources(recorder, true);
-            self.tables.start(recorder, &self.hierarchy, &self.bins, &self.elements, has_environment);
+            self.tables.start(recorder, &self.hierarchy, &self.bins, has_environment);
         });
         recorder.submit()?;
         watch.step("antiradiance, direct light", 0, 1)?;
@@ -135,7 +141,7 @@ impl Antiradiance {
     /// The sources' light alone.
     fn start(&mut self, context: &Context) -> Result<(), GpuError> {
         let mut recorder = context.recorder("antiradiance")?;
-        self.tables.start(&mut recorder, &self.hierarchy, &self.bins, &self.elements, false);
+        self.tables.start(&mut recorder, &self.hierarchy, &self.bins, false);
         recorder.submit()?;
         (self.bounced, self.damping) = (1.0, self.settings.damping);
         self.source_power = self.sum_residuals(context)?[2];
@@ -178,14 +184,21 @@ impl Antiradiance {
     }
 
     /// Moves antiradiance on until it changes no more, light being what it is.            [Dachsbacher2007 Eq. 14]
-    /// Differs from [Dachsbacher2007]: damped as the symmetric scheme is, where it goes on to swing.
+    /// Differs from [Dachsbacher2007]: damped as the symmetric scheme is, where it goes on to swing; cut at zero at first.
     fn settle(&mut self, context: &Context, bounce: u32, has_environment: bool) -> Result<(), AntiradianceError> {
         let mut first = self.residuals.len() + FREE_STEPS;
         for step in 0..self.settings.depth {
             let (sets_floor, bounced, damping) = (bounce <= 1 && step == 0, self.bounced, self.damping);
-            let step = LocalStep { has_environment, sets_floor, bounced, damping, ..LocalStep::default() };
+            // What many surfaces one behind the other take away too much of, and give back too much of, dies out slowly: a
+            // curtain seen along its folds swings for dozens of steps, and all light behind it.
+            let changed = self.residuals.last().map_or(0.0, Residual::relative);
+            let cuts = (1..=CUT_STEPS).contains(&step)
+                && step + 1 < self.settings.depth
+                && changed > CUT_ABOVE
+                && self.settings.undershoot < NEVER_CUTS;
+            let step = LocalStep { has_environment, sets_floor, cuts, bounced, damping, ..LocalStep::default() };
             let residual = self.step_once(context, bounce, step)?;
-            if residual.relative() < f64::from(self.settings.tolerance) {
+            if !cuts && residual.relative() < f64::from(self.settings.tolerance) {
                 break;
             }
             if self.residuals.get(first..).is_some_and(is_rising) && self.damp() {
@@ -199,7 +212,7 @@ impl Antiradiance {
     fn reflect(&mut self, context: &Context) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         recorder.scope("reflect", |recorder| {
-            self.tables.reflect(recorder, &self.hierarchy, &self.bins, &self.elements, (self.bounced, self.damping));
+            self.tables.reflect(recorder, &self.hierarchy, &self.bins, (self.bounced, self.damping));
         });
         recorder.submit()?;
         let power = self.sum_residuals(context)?[2];
@@ -215,7 +228,7 @@ impl Antiradiance {
             kept.step = step;
         }
         recorder.scope(format_args!("bounce {bounce}"), |recorder| {
-            self.tables.step(recorder, &self.transfers, &self.hierarchy, &self.bins, &self.elements, step);
+            self.tables.step(recorder, &self.transfers, &self.hierarchy, &self.bins, step);
         });
         recorder.submit()?;
         let [change, total, power] = self.sum_residuals(context)?;

@@ -28,6 +28,16 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// What carries light on flat parts of meshes.
+    pub enum Leaves {
+        /// The cell of each vertex, as on other parts
+        Vertices = "vertices",
+        /// Patches of a quadtree, each of the cells of several vertices: fewer links and smaller tables
+        Patches = "patches",
+    }
+}
+
 crate::settings! {
     /// What antiradiance lets the user choose.
     pub struct Settings {
@@ -35,7 +45,8 @@ crate::settings! {
         bins: BinCount = BinCount::of_octant_side(5), paper "128 (128 to 1024)";
         /// The order of the steps.
         scheme: Scheme = Scheme::Asymmetric, paper "symmetric; both are given";
-        /// Steps of the symmetric scheme.
+        /// Steps of the symmetric scheme. Direct light that comes along links (of the environment, and of emitters that are not
+        /// sampled) settles before them, in at most `depth` steps of antiradiance alone.
         iterations: u32 = 8, range 1..=1000, unit "steps", paper "4 (8 for the finest pictures)";
         /// Share of each step that is taken; halved, down to 1/16, where changes grow.
         damping: f32 = 1.0, range 0.0625..=1.0, paper "1";
@@ -45,12 +56,16 @@ crate::settings! {
         tolerance: f32 = 0.002, range 0.0..=1.0, paper "not given";
         /// How a sender spreads over the receiver's bins.
         spread: Spread = Spread::Cone, paper "gaussian";
+        /// What carries light on flat parts of meshes.
+        leaves: Leaves = Leaves::Vertices, paper "patches on flat parts, vertices elsewhere";
+        /// Longest side of a patch of a flat part, as a share of the scene's diagonal.
+        patch_side: f32 = 0.03, range 0.001..=1.0, paper "not given";
         /// Largest solid angle of a node of a link, in bins. Larger makes fewer, coarser links.
         refinement: f32 = 3.0, range 0.01..=100.0, unit "bins", paper "1";
         /// How far below zero the light of a bin may fall, of what the bin, and its side on average, received unoccluded:
         /// keeps the iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
-        /// never cuts.
-        undershoot: f32 = 0.5, range 0.0..=1e9, paper "no limit";
+        /// never cuts, but for the steps of the asymmetric scheme that follow the first of a bounce.
+        undershoot: f32 = 0.25, range 0.0..=1e9, paper "no limit";
         /// Which surfaces take away light that meets their backs.
         backs: Backs = Backs::Open, paper "none: solids only";
         /// Leaves whose specular lobe reflects at least this much at normal incidence reflect it bin by bin; others reflect

@@ -30,7 +30,9 @@ pub struct Tables {
     pub is_environment_black: bool,
     /// Per leaf: scale of its cosines.
     pub cosine_norms: Buffer<f32>,
-    /// Two per leaf from here on, front and back, W/m2. Radiosity without transport.
+    /// Two per leaf from here on, front and back.
+    pub albedo: Buffer<Vec3>,
+    /// W/m2. Radiosity without transport.
     pub source: Buffer<Vec3>,
     pub radiosity: Buffer<Vec3>,
     /// Mean radiance that arrived before anything was taken away, W m^-2 sr^-1.
@@ -60,6 +62,8 @@ pub struct LocalStep {
     pub has_environment: bool,
     /// What arrives now, uncut, sets how far below zero a bin may fall from now on.
     pub sets_floor: bool,
+    /// Nothing falls below zero, whatever [`Tables::undershoot`] says.
+    pub cuts: bool,
     /// Reflected light of all bounces so far, of the sources': the floor grows with it.
     pub bounced: f32,
     /// Share of the new exitant light, the rest stays what it was: less than 1 damps the iteration.
@@ -68,7 +72,7 @@ pub struct LocalStep {
 
 impl Default for LocalStep {
     fn default() -> Self {
-        Self { reflects: false, has_environment: false, sets_floor: false, bounced: 1.0, damping: 1.0 }
+        Self { reflects: false, has_environment: false, sets_floor: false, cuts: false, bounced: 1.0, damping: 1.0 }
     }
 }
 
@@ -106,6 +110,7 @@ impl Tables {
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
             is_environment_black: environment.is_black(),
             cosine_norms: context.buffer("antiradiance/cosine norms", leaves)?,
+            albedo: context.buffer("antiradiance/leaf albedo", sides)?,
             source: context.buffer("antiradiance/source", sides)?,
             radiosity: context.buffer("antiradiance/radiosity", sides)?,
             means: context.buffer("antiradiance/means", sides)?,
@@ -130,27 +135,29 @@ impl Tables {
         recorder.dispatch(&pass, leaf_count);
     }
 
+    /// Follows the elements' materials.
+    pub fn update_albedo(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, elements: &Elements) {
+        let leaf_count = hierarchy.leaf_count();
+        let pass = passes::LeafAlbedo {
+            leaves: &hierarchy.leaves,
+            members: &hierarchy.members,
+            back_elements: &elements.back_elements,
+            area: &elements.area,
+            albedo: &elements.albedo,
+            leaf_albedo: &self.albedo,
+            params: passes::LeafAlbedoParams { leaf_count },
+        };
+        recorder.dispatch(&pass, leaf_count);
+    }
+
     /// Starts over: no light has been transported yet, leaves send their sources.
-    pub fn start(
-        &self,
-        recorder: &mut Recorder<'_>,
-        hierarchy: &Hierarchy,
-        bins: &DeviceBins,
-        elements: &Elements,
-        has_environment: bool,
-    ) {
+    pub fn start(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, has_environment: bool) {
         recorder.fill(&self.incident, 0);
         recorder.fill(&self.exitant, 0);
         recorder.fill(&self.means, 0);
         recorder.fill(&self.peaks, 0);
         recorder.copy(&self.gloss.base, &self.gloss.specular);
-        self.local(
-            recorder,
-            hierarchy,
-            bins,
-            elements,
-            LocalStep { has_environment, sets_floor: true, ..LocalStep::default() },
-        );
+        self.local(recorder, hierarchy, bins, LocalStep { has_environment, sets_floor: true, ..LocalStep::default() });
     }
 
     /// One application of U, then K and J: global, push, local, pull.                  [Dachsbacher2007 4.2]
@@ -160,14 +167,13 @@ impl Tables {
         transfers: &Transfers,
         hierarchy: &Hierarchy,
         bins: &DeviceBins,
-        elements: &Elements,
         step: LocalStep,
     ) {
         recorder.scope("global", |recorder| {
             transfers.gather(recorder, self.half, &self.exitant, &self.incident);
         });
         recorder.scope("push", |recorder| self.push(recorder, hierarchy));
-        self.local(recorder, hierarchy, bins, elements, step);
+        self.local(recorder, hierarchy, bins, step);
     }
 
     /// Reflects what arrived last; antiradiance stays what it is.
@@ -176,11 +182,10 @@ impl Tables {
         recorder: &mut Recorder<'_>,
         hierarchy: &Hierarchy,
         bins: &DeviceBins,
-        elements: &Elements,
         (bounced, damping): (f32, f32),
     ) {
         let step = LocalStep { reflects: true, bounced, damping, ..LocalStep::default() };
-        self.local(recorder, hierarchy, bins, elements, step);
+        self.local(recorder, hierarchy, bins, step);
     }
 
     fn push(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy) {
@@ -203,14 +208,7 @@ impl Tables {
         });
     }
 
-    fn local(
-        &self,
-        recorder: &mut Recorder<'_>,
-        hierarchy: &Hierarchy,
-        bins: &DeviceBins,
-        elements: &Elements,
-        step: LocalStep,
-    ) {
+    fn local(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, step: LocalStep) {
         if step.reflects {
             recorder
                 .scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
@@ -218,7 +216,7 @@ impl Tables {
         let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
         let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
         let part_count = bin_count / BINS_A_THREAD;
-        let undershoot = step.bounced * self.undershoot;
+        let undershoot = if step.cuts { 0.0 } else { step.bounced * self.undershoot };
         let (sets_floor, add_environment) = (u32::from(step.sets_floor), u32::from(step.has_environment));
         let irradiance = passes::LocalIrradiance {
             leaves: &hierarchy.leaves,
@@ -237,7 +235,7 @@ impl Tables {
             parts: &self.irradiance_parts,
             leaves: &hierarchy.leaves,
             source: &self.source,
-            albedo: &elements.albedo,
+            leaf_albedo: &self.albedo,
             radiosity: &self.radiosity,
             means: &self.means,
             irradiance: &self.irradiance,

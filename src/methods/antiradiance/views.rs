@@ -106,10 +106,12 @@ impl Antiradiance {
 
     fn color_leaf(&self, node: u32, color: Vec3, colors: &mut [Vec3]) {
         let plan = &self.hierarchy.plan;
-        let leaf = &plan.leaves[plan.nodes[node as usize].leaf as usize];
-        colors[leaf.element as usize] = color;
-        if leaf.back_element != NONE {
-            colors[leaf.back_element as usize] = color;
+        for &vertex in plan.members_of(plan.nodes[node as usize].leaf) {
+            colors[vertex as usize] = color;
+            let back = self.elements.topology.back_elements[vertex as usize];
+            if back != NONE {
+                colors[back as usize] = color;
+            }
         }
     }
 

@@ -5,8 +5,9 @@
 //! bounds are bounds.                                                                    [Gobbetti2003 3.1]
 
 use super::forest::Forest;
-use super::{CONVEX, MeshFaces, calipers};
+use super::{CONVEX, MeshFaces};
 use crate::gpu::shaders::types::FaceCluster;
+use crate::scene::calipers;
 use glam::{DVec3, Mat3, Quat, Vec2, Vec3};
 use rayon::prelude::*;
 

@@ -15,7 +15,6 @@
 //! [Garland2001]: crate::methods::PAPERS
 
 pub mod cache;
-mod calipers;
 pub mod contract;
 pub mod forest;
 pub mod measure;

@@ -1,4 +1,7 @@
 //! The smallest rectangle around points of the plane: rotating callipers on their convex hull.   [Toussaint1983]
+//!
+//! [Andrew1979]: crate::methods::PAPERS
+//! [Toussaint1983]: crate::methods::PAPERS
 
 use glam::Vec2;
 
