@@ -255,9 +255,9 @@ impl Context {
             }
             Err(error) => {
                 // The work may still be running: until it ends, nothing that it uses may be freed or used again.
-                // SAFETY: the device is alive; the queue is ours alone while its lock is held.
                 let idle = {
                     let _queue = lock(&self.device.queue_lock);
+                    // SAFETY: the device is alive; the queue is ours alone while its lock is held.
                     unsafe { self.device.raw.device_wait_idle() }
                 };
                 match idle {

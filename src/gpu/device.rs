@@ -267,6 +267,8 @@ impl Device {
         unsafe { debug_utils.cmd_end_debug_utils_label(commands) };
     }
 
+    /// # Safety
+    /// `commands` is recording, outside of rendering; what `info` names is alive and in the layouts it says.
     pub unsafe fn cmd_pipeline_barrier2(&self, commands: vk::CommandBuffer, info: &vk::DependencyInfo<'_>) {
         // SAFETY: as the caller promises for `commands` and `info`.
         unsafe {
@@ -277,6 +279,8 @@ impl Device {
         }
     }
 
+    /// # Safety
+    /// `commands` is recording, outside of rendering; attachments are alive and in the layouts that `info` says.
     pub unsafe fn cmd_begin_rendering(&self, commands: vk::CommandBuffer, info: &vk::RenderingInfo<'_>) {
         // SAFETY: as the caller promises.
         unsafe {
@@ -287,6 +291,8 @@ impl Device {
         }
     }
 
+    /// # Safety
+    /// `commands` is recording what [`Self::cmd_begin_rendering`] began.
     pub unsafe fn cmd_end_rendering(&self, commands: vk::CommandBuffer) {
         // SAFETY: as the caller promises.
         unsafe {

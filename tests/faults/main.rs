@@ -2,7 +2,7 @@
 //! ends in an error of its type (or does as well without), with nothing left behind on the device or the disk.
 //!
 //! Small work on a device fails at every call. Renders fail at a sample of theirs: `LINKLIGHT_FAULTS=all` takes every one
-//! of them, which is hours; a number takes so many a method.
+//! of them, which is hours; a number takes so many a method, and `LINKLIGHT_FAULTS_METHODS=path-tracing` one method alone.
 
 mod device;
 mod renders;

@@ -5,7 +5,7 @@ use clap::Parser as _;
 use linklight::app::{self, AppError, cli::Cli};
 use linklight::files::{FileFaults, PLANTED};
 use linklight::gpu::{Failure, FaultInjection};
-use linklight::methods::METHODS;
+use linklight::methods::{METHODS, Method};
 use linklight::report::image;
 use linklight::report::profile::Profile;
 use std::path::{Path, PathBuf};
@@ -38,6 +38,14 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
+/// All, or those that LINKLIGHT_FAULTS_METHODS names, separated by commas.
+fn chosen_methods() -> impl Iterator<Item = &'static Method> {
+    let wanted = std::env::var("LINKLIGHT_FAULTS_METHODS").ok();
+    METHODS.iter().filter(move |method| {
+        wanted.as_ref().is_none_or(|wanted| wanted.split(',').any(|name| name == method.key))
+    })
+}
+
 /// Elements enough for a few, where the method takes a number.
 fn elements(method: &str) -> &'static [&'static str] {
     match method {
@@ -57,7 +65,7 @@ fn renders_survive_vulkan_calls_that_fail() {
     let output = folder.path().join("out.exr");
     let path = output.to_str().unwrap();
     let faults = FaultInjection::start();
-    for method in METHODS {
+    for method in chosen_methods() {
         let options = [&["--validate", "-o", path], elements(method.key)].concat();
         // Twice: the first fills the caches.
         render(method.key, &options).unwrap_or_else(|error| panic!("{}: {error}", method.key));
@@ -100,7 +108,7 @@ fn renders_end_where_the_device_is_lost() {
     let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let (output, profile, crash) = (path("out.exr"), path("profile.json"), path("crash.json"));
     let faults = FaultInjection::start();
-    for method in METHODS {
+    for method in chosen_methods() {
         let options = [&["-o", &output, "--profile", &profile], elements(method.key)].concat();
         render(method.key, &options).unwrap_or_else(|error| panic!("{}: {error}", method.key));
         let mut passes: Vec<String> =

@@ -30,6 +30,8 @@ use crate::stages::film::Film;
 
 /// Width of the panel, points.
 pub const PANEL_WIDTH: f32 = 300.0;
+/// And of the window with figures, about.
+const COMPARISON_WIDTH: f32 = 330.0;
 /// Longest step of time between two frames, so that a hitch makes no leap.
 const LONGEST_STEP: Duration = Duration::from_millis(200);
 
@@ -421,7 +423,9 @@ impl Viewer {
 
     fn show_comparison(&self, ui: &Ui) {
         let corner = [self.corner[0] as f32 + 10.0, self.corner[1] as f32 + 10.0];
-        egui::Window::new("Comparison").default_pos(corner).resizable(false).show(ui.ctx(), |ui| {
+        // Before it is laid out it counts as wide as this: a wider guess would push it over the panel.
+        let window = egui::Window::new("Comparison").default_pos(corner).default_width(COMPARISON_WIDTH);
+        window.resizable(false).show(ui.ctx(), |ui| {
             ui.style_mut().wrap_mode = Some(egui::TextWrapMode::Extend);
             match &self.compared {
                 Some(compared) => compared.rows(ui),
