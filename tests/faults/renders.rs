@@ -41,9 +41,9 @@ fn names(folder: &Path) -> Vec<String> {
 /// All, or those that LINKLIGHT_FAULTS_METHODS names, separated by commas.
 fn chosen_methods() -> impl Iterator<Item = &'static Method> {
     let wanted = std::env::var("LINKLIGHT_FAULTS_METHODS").ok();
-    METHODS.iter().filter(move |method| {
-        wanted.as_ref().is_none_or(|wanted| wanted.split(',').any(|name| name == method.key))
-    })
+    METHODS
+        .iter()
+        .filter(move |method| wanted.as_ref().is_none_or(|wanted| wanted.split(',').any(|name| name == method.key)))
 }
 
 /// Elements enough for a few, where the method takes a number.

@@ -20,6 +20,10 @@ const SMALL: [(&str, &str); 4] = [
     ("face-cluster", "--set threshold=0.001"),
 ];
 
+pub(super) fn small_settings(method: &str) -> &'static str {
+    SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings)
+}
+
 /// SplitMix64.
 struct Random(u64);
 
@@ -114,7 +118,7 @@ fn random_edits_leave_pictures_and_memory_as_they_were() {
 
 fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
     let context = context();
-    let settings = SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings);
+    let settings = small_settings(method);
     let asked = |state: &State| format!("builtin:{scene} --method {method} {settings} {}", state.options());
     let mut engine = Engine::new(&context);
     let (mut state, mut random) = (State { bounces: 1, ..State::default() }, Random(seed));
