@@ -53,6 +53,7 @@ void main()
         b = surfels[sender];
         Extents extents = Extents(b.normal, 0.0, b.radius, b.thickness);
         if (are_leaves()) cell = leaf_cells[sender];
+        hold_ellipse(b);
         // Of leaves with many triangles around them, some after the other.
         uint from = 0;
         do {

@@ -6,6 +6,7 @@
 uint sender;
 Surfel b;
 LeafCell cell;          // of a leaf
+vec3 half_axes[2];      // of the ellipse of one that is flat, m
 Receiver at;
 vec3 offset;            // from receiver to sender
 
@@ -85,16 +86,27 @@ Meeting meet_ellipse(vec3 normal, float plane, vec3 r, vec3 s, vec3 direction)
     return Meeting(is_met ? plane / slope : FAR, plane > 0.0);
 }
 
+// Two half axes, conjugate to each other, of the ellipse that g1 and g2 stand for.
+void hold_ellipse(Surfel s)
+{
+    vec3 along = cross(s.g2, s.normal), across = cross(s.normal, s.g1);
+    float inverse = dot(s.g1, along);
+    inverse = inverse != 0.0 ? 1.0 / inverse : 0.0;
+    half_axes[0] = inverse * along;
+    half_axes[1] = inverse * across;
+}
+
+vec3 in_bins(vec3 v) { return IS_TURNED != 0 ? turn_back(at.frame, v) : v; }
+
 // `row`: place of the receiver's first bin.
 void link(uint row)
 {
-    vec3 local_offset = IS_TURNED != 0 ? turn_back(at.frame, offset) : offset;
     if (IS_SINGLE != 0) {
-        propose(row + bin_of(local_offset, params.n), length(offset), dot(b.normal, offset) > 0.0);
+        propose(row + bin_of(in_bins(offset), params.n), length(offset), dot(b.normal, offset) > 0.0);
         return;
     }
     Surfel seen = b;
-    float reach = b.radius, plane = 0.0;
+    float plane = 0.0;
     vec3 r = vec3(0.0), s = vec3(0.0);
     if (KIND == OF_FLAT_LEAVES) {
         plane = dot(b.normal, cell.vertex - at.origin);
@@ -107,16 +119,16 @@ void link(uint row)
             shape_surfel(moments[sender], seen);
             seen.g1 *= SURFEL_REACH / SURFEL_OUTLINE;
             seen.g2 *= SURFEL_REACH / SURFEL_OUTLINE;
+            hold_ellipse(seen);
         }
         plane = dot(seen.normal, offset);
         r = plane * seen.g1 - dot(seen.g1, offset) * seen.normal;
         s = plane * seen.g2 - dot(seen.g2, offset) * seen.normal;
-        // The longer semi-axis, from the smaller singular value of (g1, g2).
-        float g11 = dot(seen.g1, seen.g1), g12 = dot(seen.g1, seen.g2), g22 = dot(seen.g2, seen.g2);
-        float least = 0.5 * (g11 + g22) - sqrt(0.25 * (g11 - g22) * (g11 - g22) + g12 * g12);
-        reach = least > 0.0 ? min(1.0 / sqrt(least), 4.0 * seen.extent) : 4.0 * seen.extent;
     }
-    for (CellWalk walk = walk_cells(local_offset, reach, params.n); has_cell(walk); next_cell(walk, params.n)) {
+    SeenOutline outline;
+    if (KIND == OF_LEAVES) outline = seen_sphere(in_bins(offset), b.radius);
+    else outline = seen_ellipse(in_bins(offset), in_bins(half_axes[0]), in_bins(half_axes[1]));
+    for (CellWalk walk = walk_cells(outline, params.n); has_cell(walk); next_cell(outline, walk, params.n)) {
         vec2 uv = vec2(2 * walk.cell + 1) / float(params.n) - 1.0;
         vec3 direction = face_direction(walk.face, uv);
         if (IS_TURNED != 0) direction = turn(at.frame, direction);
