@@ -116,7 +116,7 @@ struct Trembling {
 }
 
 fn trembling(context: &TestContext, settings: impl Fn(usize) -> Settings) -> Trembling {
-    const FRAMES: usize = 4;
+    const FRAMES: usize = 3;
     let scene = builtin_scene("dancer");
     let pose = |frame: usize| Pose::at(&scene, 1.0 + frame as f32 / 30.0);
     let fixture = Fixture::posed(context, scene.clone(), None, Environment::default(), &pose(0));
@@ -166,7 +166,7 @@ fn what_stands_still_trembles_little_while_the_figure_dances() {
     };
     let still = Settings { bins: 4, smoothing: false, ..Settings::default() };
     let world = of("N = 4", &|_| still);
-    let finer = of("N = 8", &|_| Settings { bins: 8, ..still });
+    let finer = of("N = 6", &|_| Settings { bins: 6, ..still });
     // Bins that turn from frame to frame: what the figure would see of noise.
     let turned = of("N = 4, turned by 7 degrees a frame", &|frame| Settings { spin: 7.0 * frame as f32, ..still });
     assert!(world.noise < 0.02 && finer.noise < world.noise, "{} {}", world.noise, finer.noise);
