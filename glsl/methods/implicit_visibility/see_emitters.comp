@@ -25,38 +25,47 @@ layout(push_constant, scalar) uniform Params {
     uint sample_count;
 } params;
 
-// Whether the winner's plane passes between the receiver and the point, and whether where it does is the winner itself.
-bvec2 hides(uint winner, vec3 origin, vec3 point)
+// How a winner stands to a point that is looked at.
+struct Shade {
+    bool by_plane;      // its plane passes between the receiver and the point
+    bool is_beside;     // and where it does is no farther off the winner than the next bins are
+    bool by_itself;     // or is the winner itself
+};
+
+Shade shade_of(uint winner, vec3 origin, vec3 point)
 {
-    if (winner == EMPTY_BIN) return bvec2(false);
+    if (winner == EMPTY_BIN) return Shade(false, false, false);
     Surfel s = surfels[winner & NODE_MASK];
     float of_origin = dot(s.normal, origin - s.centre), of_point = dot(s.normal, point - s.centre);
     float slack = s.thickness + 0.02 * s.extent;
-    if (!(of_origin > 0.0 ? of_point < -slack : of_point > slack)) return bvec2(false);
-    vec3 there = mix(origin, point, of_origin / (of_origin - of_point)) - s.centre;
-    float r = dot(s.g1, there), t = dot(s.g2, there);
-    return bvec2(true, r * r + t * t <= 1.0);
+    if (!(of_origin > 0.0 ? of_point < -slack : of_point > slack)) return Shade(false, false, false);
+    vec3 met = mix(origin, point, of_origin / (of_origin - of_point)), there = met - s.centre;
+    float r = dot(s.g1, there), t = dot(s.g2, there), reach = s.extent + 2.0 / float(params.n) * length(met - origin);
+    return Shade(true, dot(there, there) <= reach * reach, r * r + t * t <= 1.0);
 }
 
 // A point is hidden by a winner of one of the four bins around its direction, or by the surface that lies before it in
-// all four. Where only some have it before the point, its edge passes between them, and there the winners are what is
-// known of it: their planes go on behind and below it.
+// all four. Where only some have it before the point, its edge passes between them: halfway, as far as the bins can tell,
+// so that those decide that are nearer to its direction.
 bool is_visible(uint local, Receiver at, vec3 point)
 {
     vec3 direction = turn_back(at.frame, point - at.origin);
     uint face = face_of(direction);
     vec3 in_axes = in_face(face, direction);
-    vec2 low = floor((0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5);
+    vec2 place = (0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5, low = floor(place), share = place - low;
     bool by_all = true, by_one = false;
+    float hidden = 0.0;
     for (uint corner = 0; corner < 4; ++corner) {
         // Beyond the face's rim the direction leads to a neighbouring face.
-        vec2 uv = (2.0 * (low + vec2(corner & 1, corner >> 1)) + 1.0) / float(params.n) - 1.0;
+        vec2 side = vec2(corner & 1, corner >> 1), uv = (2.0 * (low + side) + 1.0) / float(params.n) - 1.0;
         uint bin = bin_of(face_direction(face, uv), params.n);
-        bvec2 hidden = hides(winners[bin * params.leaf_count + local], at.origin, point);
-        by_all = by_all && hidden.x;
-        by_one = by_one || hidden.y;
+        Shade shade = shade_of(winners[bin * params.leaf_count + local], at.origin, point);
+        vec2 weights = mix(1.0 - share, share, side);
+        by_all = by_all && shade.by_plane;
+        by_one = by_one || shade.by_itself;
+        hidden += shade.is_beside ? weights.x * weights.y : 0.0;
     }
-    return !by_all && !by_one;
+    return !by_all && !by_one && hidden <= 0.5;
 }
 
 void main()
