@@ -72,13 +72,13 @@ fn links_within_a_budget_come_to_what_links_at_once_are_and_tell_their_age() {
 
     // Two sets of links take turns: once both are there nothing is allocated any more, and nothing grows.
     let mut held = Vec::new();
-    for frame in 0..24u8 {
+    for frame in 0..14u8 {
         pose(&context, &fixture, 0.9 + 0.1 * f32::from(frame % 3));
         spread.follow_within(&context, &fixture.stage(), quarter, true).unwrap();
         let bytes: u64 = context.memory_by_owner().values().map(|memory| memory.current_bytes).sum();
         held.push((context.allocation_count(), bytes));
     }
-    assert!(held[11..].iter().all(|now| *now == held[11]), "allocations and bytes by frame: {held:?}");
+    assert!(held[7..].iter().all(|now| *now == held[7]), "allocations and bytes by frame: {held:?}");
 }
 
 #[test]
@@ -128,6 +128,10 @@ fn two_devices_make_the_links_of_one_to_the_bit() {
         let shares = &together.report().device_elements;
         assert!(shares.len() == 2 && shares.iter().all(|&share| share > 0), "both took part: {shares:?}");
         assert_eq!(shares.iter().sum::<u32>(), alone.elements().count);
+        assert_eq!(together.helpers()[0].validation_messages(), [""; 0]);
+        if packed_links {
+            continue;
+        }
         // Both follow what moves: the same scene turned into another by its own pose.
         let before = state(&context, &alone);
         pose(&context, &fixture, 0.7);

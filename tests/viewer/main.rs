@@ -156,28 +156,31 @@ fn nothing_done_at_random_leaves_a_trace() {
     for _ in 0..actions {
         let (x, y) = (20 + random.below(100), 20 + random.below(60));
         let window = view.window.clone();
+        // Keys go to the window that has the focus; without a window manager one that was away has it not.
+        let press = |key: &str| view.xdotool(&format!("windowfocus --sync {window} key {key}"));
         match random.below(11) {
             0 if method < 2 => {
-                view.xdotool("key Next");
+                press("Next");
                 method += 1;
             }
             1 if method > -1 => {
-                view.xdotool("key Prior");
+                press("Prior");
                 method -= 1;
             }
             2 => view.xdotool(&format!("windowsize {window} {} {}", 100 + x, 50 + y)),
             3 => {
-                view.xdotool("key F1");
+                press("F1");
                 hidden = !hidden;
             }
-            4 => view.xdotool("key ctrl+l"),
-            5 => view.xdotool("key Escape"),
+            4 => press("ctrl+l"),
+            5 => press("Escape"),
             // The panel fills so small a window: a click in it may change anything.
             7.. if !hidden => {
-                view.xdotool("key F1");
+                press("F1");
                 hidden = true;
             }
-            6 => view.xdotool(&format!("windowunmap --sync {window} windowmap --sync {window} windowfocus {window}")),
+            6 => view
+                .xdotool(&format!("windowunmap --sync {window} windowmap --sync {window} windowfocus --sync {window}")),
             7 => view.xdotool(&format!("mousemove {x} {y} click 4")),
             8 => view.xdotool(&format!("mousemove {x} {y} click 1")),
             // What was picked moves.
@@ -195,7 +198,7 @@ fn nothing_done_at_random_leaves_a_trace() {
     }
     // Back to where it began. What Escape cancelled is asked for again by the changes.
     let window = view.window.clone();
-    view.xdotool(&format!("windowfocus {window}"));
+    view.xdotool(&format!("windowfocus --sync {window}"));
     if !hidden {
         view.xdotool("key F1");
     }

@@ -348,7 +348,3 @@ mod tests;
 #[cfg(test)]
 #[path = "soak_tests.rs"]
 mod soak_tests;
-
-#[cfg(test)]
-#[path = "assisted_tests.rs"]
-mod assisted_tests;

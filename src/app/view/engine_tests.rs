@@ -11,7 +11,7 @@ use crate::stages::work::Unwatched;
 /// Where a test says nothing else.
 const PICTURE: [(&str, &str); 4] = [("--size", "30x20"), ("--elements", "400"), ("--bounces", "1"), ("--spp", "1")];
 
-pub(super) fn context() -> Context {
+fn context() -> Context {
     Context::new(Options { validation: true, ..Options::default() }).unwrap()
 }
 
