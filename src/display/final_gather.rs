@@ -65,7 +65,7 @@ crate::settings! {
         gather_threshold: f32 = 0.05, range 0.0..=1.0, unit "of white", paper "user-defined";
         /// Senders that would change what is shown by less than this share of the threshold are asked by chance, and count
         /// for those that are not; needs jitter.
-        gather_chance: f32 = 0.05, range 0.0..=100.0, unit "of gather_threshold", paper "not done";
+        gather_chance: f32 = 0.0, range 0.0..=100.0, unit "of gather_threshold", paper "not done";
         /// What decides whether a sender is seen.
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Checked maps are not asked of senders nearer than so many of their radii, rays are.
