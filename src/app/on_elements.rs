@@ -238,7 +238,7 @@ impl OnElements for Antiradiance {
         let mut recorder = context.recorder("frame")?;
         recorder.scope("look", |recorder| Self::look(self, recorder, world, view));
         recorder.submit()?;
-        Ok((self.direct_irradiance(), self.shown_irradiance()))
+        Ok(self.shown_irradiance())
     }
 
     fn splats(&self) -> Option<&Splats> {

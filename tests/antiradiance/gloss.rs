@@ -202,7 +202,7 @@ fn the_eye_sees_the_lobes() {
     let mut recorder = context.recorder("test").unwrap();
     method.look(&mut recorder, &fixture.world, &view);
     recorder.submit().unwrap();
-    let shown = context.download(method.shown_irradiance()).unwrap();
+    let shown = context.download(method.shown_irradiance().1).unwrap();
     let (state, positions) = (State::of(&context, &method), context.download(&fixture.world.positions).unwrap());
     let albedo = context.download(&method.elements().albedo).unwrap();
     let (mut found, mut expected) = (Vec::new(), Vec::new());
@@ -223,4 +223,43 @@ fn the_eye_sees_the_lobes() {
     let glossy: Vec<u32> = state.glossy.iter().map(|&leaf| state.leaves[leaf as usize].element).collect();
     assert!((0..indirect.len()).all(|e| glossy.contains(&(e as u32)) || shown[e] == indirect[e]));
     assert!(state.leaves.iter().all(|leaf| leaf.node != NONE));
+}
+
+/// The small plate as it shines in the floor: like a point of its intensity.
+#[test]
+fn the_eye_sees_sampled_emitters_in_lobes() {
+    let context = TestContext::new();
+    let fixture = glossy_fixture(&context, metal_floor(true));
+    let mut method = prepare(&context, &fixture, Settings { emitters: EmitterChoice::Sampled, ..settings(128) });
+    let direct = solve(&context, &mut method, &fixture, 0).direct;
+    let view = View::towards(Vec3::new(0.5, 1.5, 2.5), Vec3::ZERO, 0.8, UVec2::new(64, 64));
+    let mut recorder = context.recorder("test").unwrap();
+    method.look(&mut recorder, &fixture.world, &view);
+    recorder.submit().unwrap();
+    let shown = context.download(method.shown_irradiance().0).unwrap();
+    let state = State::of(&context, &method);
+    let (positions, albedo) =
+        (context.download(&method.elements().positions).unwrap(), context.download(&method.elements().albedo).unwrap());
+    let (mut found, mut expected, mut even) = (Vec::new(), Vec::new(), Vec::new());
+    for &leaf in &state.glossy {
+        let (own, lobe) = (&state.leaves[leaf as usize], &state.lobes[leaf as usize]);
+        let (element, normal, f0) = (own.element as usize, own.normal.as_dvec3(), lobe.f0.as_dvec3());
+        let offset = (LAMP - positions[element]).as_dvec3();
+        let (to_lamp, squared) = (offset.normalize(), offset.length_squared());
+        let arriving = 5.0 / squared * normal.dot(to_lamp) * to_lamp.y;
+        let eye = (view.position - positions[element]).as_dvec3().normalize();
+        let (cos_eye, own_albedo) = (normal.dot(eye), albedo[element].as_dvec3());
+        let glossy = PI * arriving * brdf(f0, 1.0, state.alpha(leaf as usize), normal, eye, to_lamp);
+        let sent = diffuse_albedo(own_albedo, f0, 1.0, cos_eye) * arriving + glossy;
+        expected.push(sent / even_albedo(own_albedo, f0, 1.0, lobe.alpha.into(), cos_eye).max(DVec3::splat(1e-4)));
+        found.push(shown[element]);
+        even.push(direct[element]);
+    }
+    println!(
+        "sampled light in lobes differs by {:.1e}, even light by {:.1e}",
+        difference(&found, &expected),
+        difference(&even, &expected)
+    );
+    assert!(difference(&found, &expected) < 0.02);
+    assert!(difference(&even, &expected) > 0.1, "the lobe makes a difference");
 }

@@ -5,12 +5,12 @@
 #include "lib/hierarchy.glsl"
 
 // One thread per leaf and few bins: reflected radiance, less antiradiance, which goes on where the light came from,
-// negated.                                                                       [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
+// negated; but for what local_irradiance has sent.                               [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1),
 //       glossy_of_leaf[leaf_count], specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)
 // updates peaks[BIN_COUNT * leaf_count] (of the mean), exitant (of leaves; intensity per area, W m^-2 sr^-1)
-// writes residual_parts[BIN_COUNT / BINS_A_THREAD * leaf_count] (W: how much the exitant light changed, how much there is)
+//         residual_parts[BIN_COUNT / BINS_A_THREAD * leaf_count] (W: how much the exitant light changed, how much there is)
 // shared none
 // Differs from [Dachsbacher2007]: what arrives in a bin may not fall far below zero. While antiradiance settles, each step
 // takes away too much, then too little; without a floor the difference first grows with the number of surfaces one behind
@@ -30,7 +30,7 @@ layout(set = 0, binding = 8, scalar) buffer Peaks { float peaks[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer GlossyOfLeaf { uint glossy_of_leaf[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer Specular { vec3 specular[]; };
 layout(set = 0, binding = 11, scalar) buffer Exitant { uint64_t exitant[]; };
-layout(set = 0, binding = 12, scalar) writeonly buffer ResidualParts { vec2 residual_parts[]; };
+layout(set = 0, binding = 12, scalar) buffer ResidualParts { vec2 residual_parts[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint node_count;
@@ -62,10 +62,13 @@ void main()
     float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
     vec3 l_front = radiosity[2 * leaf] / PI, l_back = radiosity[2 * leaf + 1] / PI, mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
 
+    bool was_sent = params.sets_floor == 0 && (own.flags & REFLECTS_BEHIND) == 0;
+
     vec2 residual = vec2(0.0);      // change, sum
     for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         float cosine = dot(own.normal, bin_directions[bin]);
         bool leaves_front = cosine > 0.0;
+        if (was_sent && !leaves_front) continue;
         vec3 radiance = leaves_front ? l_front : l_back;
         if (glossy != NONE) radiance += specular[glossy * BIN_COUNT + bin];
         float held = discrete_cosine(cosine, norm, BIN_COUNT);
@@ -81,12 +84,7 @@ void main()
             else arriving = max(arriving, lowest_of(peaks[at], mean, params.undershoot));
             radiance -= arriving;
         }
-        uint entry = entry_of(own.node, bin, params.node_count);
-        vec3 before = LOAD_ENTRY(exitant, entry);
-        vec3 intensity = mix(before, held * radiance, params.damping);
-        vec3 change = abs(intensity - before);
-        residual += vec2(change.r + change.g + change.b, abs(intensity.r) + abs(intensity.g) + abs(intensity.b));
-        STORE_ENTRY(exitant, entry, intensity);
+        SEND(entry_of(own.node, bin, params.node_count), held * radiance, residual)
     }
-    residual_parts[part * params.leaf_count + leaf] = own.area * bin_solid_angle * residual;
+    residual_parts[part * params.leaf_count + leaf] += own.area * bin_solid_angle * residual;
 }

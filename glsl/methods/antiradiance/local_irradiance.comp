@@ -4,10 +4,14 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per leaf and few bins: irradiance of both sides.                          [Dachsbacher2007 4.2 local pass]
+// One thread per leaf and few bins: irradiance of both sides; and what arrives at fronts leaves backs that reflect nothing as
+// antiradiance, here, where it is at hand: these passes wait for memory.          [Dachsbacher2007 4.2 local pass, Eq. 19]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), means[2 leaf_count] (W m^-2 sr^-1), peaks[BIN_COUNT * leaf_count] (of the mean)
-// writes parts[BIN_COUNT / BINS_A_THREAD * 2 * leaf_count] (W/m2, fronts and backs of some bins one after the other)   shared none
+// updates exitant (of leaves; intensity per area, W m^-2 sr^-1)
+// writes parts[BIN_COUNT / BINS_A_THREAD * 2 * leaf_count] (W/m2, fronts and backs of some bins one after the other),
+//        residual_parts[BIN_COUNT / BINS_A_THREAD * leaf_count] (W: how much the exitant light changed, how much there is)
+// shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
@@ -20,11 +24,14 @@ layout(set = 0, binding = 5, scalar) readonly buffer Environment { vec3 environm
 layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer Peaks { float peaks[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Parts { vec3 parts[]; };
+layout(set = 0, binding = 9, scalar) buffer Exitant { uint64_t exitant[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer ResidualParts { vec2 residual_parts[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint node_count;
-    uint sets_floor;            // 1: what arrives now counts uncut, see floor.glsl
+    uint sets_floor;            // 1: what arrives now counts uncut, see floor.glsl; nothing is sent yet
     float undershoot;
+    float damping;              // share of the new exitant light; the rest stays as it was
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
 
@@ -43,18 +50,28 @@ void main()
     // What meets the back counts where it is reflected, and for the floor of what is taken away from it.
     bool needs_back = (own.flags & REFLECTS_BEHIND) != 0 || (params.sets_floor != 0 && (own.flags & BLOCKS_BEHIND) != 0);
 
+    bool sends = params.sets_floor == 0 && (own.flags & REFLECTS_BEHIND) == 0;
+
     // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
+    vec2 residual = vec2(0.0);      // change, sum
     for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         float cosine = dot(own.normal, bin_directions[bin]);
         if (cosine > 0.0 && !needs_back) continue;
         vec3 arriving = arriving_in(own.node, parent, bin);
         if (params.sets_floor == 0)
             arriving = max(arriving, lowest_of(peaks[bin * params.leaf_count + leaf], cosine <= 0.0 ? mean_front : mean_back, params.undershoot));
-        arriving *= discrete_cosine(cosine, norm, BIN_COUNT) * bin_solid_angle;
-        if (cosine <= 0.0) front += arriving;
-        else back += arriving;
+        arriving *= discrete_cosine(cosine, norm, BIN_COUNT);
+        if (cosine > 0.0) {
+            back += arriving;
+            continue;
+        }
+        front += arriving;
+        if (sends) SEND(entry_of(own.node, bin, params.node_count), -arriving, residual)
     }
+    front *= bin_solid_angle;
+    back *= bin_solid_angle;
+    residual_parts[part * params.leaf_count + leaf] = own.area * bin_solid_angle * residual;
     parts[2 * part * params.leaf_count + leaf] = front;
     parts[(2 * part + 1) * params.leaf_count + leaf] = back;
 }

@@ -38,9 +38,7 @@ layout(push_constant, scalar) uniform Params {
 } params;
 
 #include "methods/antiradiance/glossy_surface.glsl"
-
-// Of the lobe towards the bin's direction, 1/sr, times the cosine towards the light.
-vec3 lobe(Surface s, vec3 to_eye, vec3 to_light) { return brdf_value(s, to_eye, to_light) * max(dot(s.normal, to_light), 0.0); }
+#include "methods/antiradiance/sampled_light.glsl"
 
 vec3 sent(uint element, Surface s, vec3 w)
 {
@@ -51,22 +49,8 @@ vec3 sent(uint element, Surface s, vec3 w)
         vec3 arriving = light_irradiance(lights[light], position, to_light, distance_to_light);
         sum += visibility[light * params.element_count + element] * arriving * lobe(s, w, to_light);
     }
-    uint words = (params.sample_count + 31) / 32;
-    for (uint k = 0; k < params.sample_count; ++k) {
-        if ((visible[element * words + k / 32] >> k % 32 & 1) == 0) continue;
-        EmitterSample at = samples[k];
-        uvec3 v = triangles[at.triangle];
-        EmitterPoint point = emitter_point(at, positions[v.x], positions[v.y], positions[v.z]);
-        // As a disc, like its diffuse light.
-        vec3 offset = point.position - position;
-        float squared = dot(offset, offset);
-        vec3 to_light = squared > 0.0 ? offset / sqrt(squared) : s.normal;
-        vec3 radiance = (1.0 - at.barycentrics.x - at.barycentrics.y) * emission[v.x]
-                        + at.barycentrics.x * emission[v.y] + at.barycentrics.y * emission[v.z];
-        float solid_angle = max(emitter_cosine(at, point, -to_light), 0.0) * point.area / (squared + point.area / PI);
-        sum += solid_angle * radiance * lobe(s, w, to_light);
-    }
-    return sum;
+    vec3 even;
+    return sum + sampled_radiance(element, s, w, even);
 }
 
 void main()

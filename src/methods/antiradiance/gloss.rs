@@ -163,10 +163,12 @@ impl Antiradiance {
         recorder.dispatch(&pass, gloss.count * self.tables.bin_count);
     }
 
-    /// Indirect light as the eye of `view` sees it: glossy leaves by their lobes.
+    /// Indirect light, and direct light but for that of punctual lights, as the eye of `view` sees them: glossy leaves by
+    /// their lobes.
     pub fn look(&self, recorder: &mut Recorder<'_>, world: &World, view: &View) {
         let shown = &self.state.shown;
         recorder.copy(self.indirect_irradiance(), shown);
+        recorder.copy(self.direct_irradiance(), &self.state.shown_direct);
         if self.tables.gloss.count == 0 {
             return;
         }
@@ -201,10 +203,34 @@ impl Antiradiance {
             },
         };
         recorder.dispatch(&pass, gloss.count);
+        let (elements, emitters) = (&self.elements, &self.emitters);
+        let pass = passes::DirectToEye {
+            glossy_leaves: &gloss.leaves,
+            leaves: &self.hierarchy.leaves,
+            gloss: &gloss.lobes,
+            element_positions: &elements.positions,
+            samples: &emitters.samples,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            emission: &elements.emission,
+            visible: &emitters.visible,
+            albedo: &elements.albedo,
+            members: &self.hierarchy.members,
+            back_elements: &elements.back_elements,
+            irradiance: self.direct_irradiance(),
+            shown: &self.state.shown_direct,
+            constants: passes::DirectToEyeConstants { bin_count: tables.bin_count },
+            params: passes::DirectToEyeParams {
+                eye: eye.to_array(),
+                glossy_count: gloss.count,
+                sample_count: emitters.plan.samples.len() as u32,
+            },
+        };
+        recorder.dispatch(&pass, gloss.count);
     }
 
-    /// What [`Self::look`] left, W/m2 per element.
-    pub fn shown_irradiance(&self) -> &Buffer<Vec3> {
-        &self.state.shown
+    /// What [`Self::look`] left of direct and indirect light, W/m2 per element.
+    pub fn shown_irradiance(&self) -> (&Buffer<Vec3>, &Buffer<Vec3>) {
+        (&self.state.shown_direct, &self.state.shown)
     }
 }

@@ -128,6 +128,8 @@ struct State {
     smoothed: Buffer<Vec3>,
     /// Indirect light as the eye sees it.
     shown: Buffer<Vec3>,
+    /// Direct light of emitters and the environment as the eye sees it.
+    shown_direct: Buffer<Vec3>,
     /// Per light, then per element; 0..1.
     visibility: Buffer<f32>,
     /// Shadow rays of a batch, and their answers.
@@ -408,6 +410,7 @@ impl State {
             indirect: context.buffer("antiradiance/indirect", count)?,
             smoothed: context.buffer("antiradiance/smoothed", count)?,
             shown: context.buffer("antiradiance/shown", count)?,
+            shown_direct: context.buffer("antiradiance/shown direct", count)?,
             visibility: context.buffer("antiradiance/visibility", count * light_count as usize)?,
             rays: context.buffer("antiradiance/shadow rays", shadow_rays)?,
             is_free: context.buffer("antiradiance/is free", shadow_rays)?,

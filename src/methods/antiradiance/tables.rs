@@ -228,8 +228,17 @@ impl Tables {
             means: &self.means,
             peaks: &self.peaks,
             parts: &self.irradiance_parts,
+            exitant: &self.exitant,
+            residual_parts: &self.residual_parts,
             constants: passes::LocalIrradianceConstants { words, bin_count },
-            params: passes::LocalIrradianceParams { leaf_count, node_count, sets_floor, undershoot, add_environment },
+            params: passes::LocalIrradianceParams {
+                leaf_count,
+                node_count,
+                sets_floor,
+                undershoot,
+                damping: step.damping,
+                add_environment,
+            },
         };
         let reflect = passes::LocalReflect {
             parts: &self.irradiance_parts,
