@@ -11,9 +11,15 @@ struct FaceCluster {
     vec3 emission;          // mean, W m^-2 sr^-1
     uint emission_range[2]; // least and most; shared exponent
     uint first_face;        // in the order of the tree
-    uint face_count;        // | CLUSTER_IS_CONVEX
+    uint face_count;        // its lower bits; the others: what of the faces turned off the normal meets the cluster itself
 };
-const uint CLUSTER_IS_CONVEX = 0x80000000u;
+const uint FACE_COUNT_BITS = 28u;
+
+uint face_count(FaceCluster c) { return bitfieldExtract(c.face_count, 0, int(FACE_COUNT_BITS)); }
+
+// Of what the faces send beyond the vector area, the share that strikes the cluster itself: 0 of a convex one, 1 of a
+// hollow or a rough one.
+float hollowness(FaceCluster c) { return float(c.face_count >> FACE_COUNT_BITS) / 15.0; }
 
 vec3 rotated(vec4 q, vec3 v)
 {

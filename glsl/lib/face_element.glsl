@@ -22,7 +22,7 @@ struct FaceElement {
     uint level;
     uint first_place;       // its faces, in the order of all trees
     uint place_count;
-    uint is_convex;
+    float self_share;       // of what it sends, what strikes itself
     vec3 center;            // metres, world
     vec3 axis_x;            // unit
     vec3 axis_y;
@@ -72,6 +72,17 @@ float most_projected_area(FaceElement e, vec3 direction)
     return max(d.x, 0.0) * e.facing[0] + max(-d.x, 0.0) * e.facing[1]
          + max(d.y, 0.0) * e.facing[2] + max(-d.y, 0.0) * e.facing[3]
          + max(d.z, 0.0) * e.facing[4] + max(-d.z, 0.0) * e.facing[5];
+}
+
+// Area projected towards a unit direction as it is expected between its bounds, m2: the faces' vector area, and what of
+// them turns away from it and is not hidden by the rest: to all sides alike where the element is closed, and the more to
+// the sides the flatter it is. Over all directions a share of 1 - self_share.
+float projected_area(FaceElement e, vec3 direction)
+{
+    float flat_share = vector_area(e) / max(e.area, 1e-30), along = dot(e.axis_z, direction);
+    float aside = max((1.0 - e.self_share) * e.area - vector_area(e), 0.0);
+    float expected = vector_area(e) * max(along, 0.0) + 0.25 * aside * (1.0 + flat_share - 2.0 * flat_share * abs(along));
+    return min(expected, most_projected_area(e, direction));
 }
 
 // How far the box reaches from its centre along a unit direction, metres.

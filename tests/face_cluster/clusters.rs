@@ -7,7 +7,7 @@ use glam::Vec3;
 use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::FaceCluster;
 use linklight::stages::clusters::{
-    ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, is_convex, least_projected_area, most_projected_area,
+    ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, hollowness, least_projected_area, most_projected_area,
 };
 use linklight::stages::world::World;
 
@@ -213,7 +213,7 @@ fn projected_areas_lie_within_their_bounds() {
 
 #[test]
 fn convex_is_what_cannot_see_itself() {
-    let root = |mesh: &Mesh| is_convex(&mesh.tree().clusters[0]);
+    let root = |mesh: &Mesh| hollowness(&mesh.tree().clusters[0]) == 0.0;
     assert!(root(&sheet(8, |_, _| 0.0)) && root(&sphere(8)));
     assert!(root(&sheet(8, |x, y| -(x - 0.5).powi(2) - (y - 0.5).powi(2))), "a dome seen from outside");
     assert!(!root(&sheet(8, |x, y| (x - 0.5).powi(2) + (y - 0.5).powi(2))), "a bowl seen from inside");

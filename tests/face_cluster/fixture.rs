@@ -103,7 +103,7 @@ pub fn leaves(context: &TestContext, method: &FaceClusters) -> Vec<Leaf> {
     let mut leaves = Vec::new();
     for (i, element) in elements.into_iter().enumerate() {
         if element.children == u32::MAX {
-            let normal = element.axis_z * ((element.facing[4] - element.facing[5]) / element.area);
+            let normal = element.axis_z * ((element.facing[4] - element.facing[5]) / element.area.max(1e-30));
             let along = |of: &[[[f32; 3]; 3]]| Mat3::from_cols_array_2d(&of[i * functions]).transpose() * normal;
             leaves.push(Leaf {
                 index: leaves.len() as u32,

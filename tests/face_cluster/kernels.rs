@@ -13,13 +13,13 @@ fn numbers(e: &FaceElement) -> Vec<f32> {
     for v in [e.center, e.axis_x, e.axis_y, e.axis_z, e.half_extent, e.albedo, e.emission] {
         out.extend(v.to_array());
     }
-    out.extend([e.area, e.most_albedo]);
+    out.extend([e.area, e.most_albedo, e.self_share]);
     out.extend(e.facing);
     out
 }
 
-fn whole_numbers(e: &FaceElement) -> [u32; 8] {
-    [e.cluster, e.instance, e.parent, e.children, e.level, e.first_place, e.place_count, e.is_convex]
+fn whole_numbers(e: &FaceElement) -> [u32; 7] {
+    [e.cluster, e.instance, e.parent, e.children, e.level, e.first_place, e.place_count]
 }
 
 fn check_elements(found: &[FaceElement], expected: &[FaceElement]) {

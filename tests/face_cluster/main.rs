@@ -4,6 +4,7 @@ mod common;
 
 mod bases;
 mod clusters;
+mod energy;
 mod fixture;
 mod grown;
 mod kernels;

@@ -26,6 +26,33 @@ fn most_area(e: &FaceElement, d: DVec3) -> f64 {
     (0..3).map(of_axis).sum()
 }
 
+fn projected_area(e: &FaceElement, d: DVec3) -> f64 {
+    let (area, flat, along) = (f64::from(e.area), vector_area(e), e.axis_z.as_dvec3().dot(d));
+    let aside = ((1.0 - f64::from(e.self_share)) * area - flat).max(0.0);
+    let share = flat / area;
+    let to_sides = share * 2.0 * (1.0 - along.abs()) + (1.0 - share);
+    (flat * along.max(0.0) + aside / 4.0 * to_sides).min(most_area(e, d))
+}
+
+/// What is kept of light 1 from `d`.
+fn kept_vector(t: &Tables, e: &FaceElement, d: DVec3) -> DVec3 {
+    if is_bent(e) && t.children(e.cluster).is_some() {
+        return d;
+    }
+    let beyond = projected_area(e, d) - least_area(e, d);
+    let normal = e.axis_z.as_dvec3() * (beyond / stand_in_area(e));
+    if e.axis_z.as_dvec3().dot(d) > 0.0 { d + normal } else { normal }
+}
+
+fn is_bent(e: &FaceElement) -> bool {
+    vector_area(e) < 0.7 * f64::from(e.area)
+}
+
+/// What stands for the vector area where that is small.
+fn stand_in_area(e: &FaceElement) -> f64 {
+    vector_area(e).max(0.5 * f64::from(e.area))
+}
+
 /// Whether some side of `e` looks at some corner of the box of `other`.
 fn may_face(e: &FaceElement, other: &FaceElement) -> bool {
     let size = |e: &FaceElement| f64::from(e.half_extent.x + e.half_extent.y);
@@ -44,14 +71,25 @@ fn may_face(e: &FaceElement, other: &FaceElement) -> bool {
     })
 }
 
-/// Irradiance vector of a triangle of radiosity 1, of either side.                              [Arvo1995 Eq. 2.5]
-fn triangle_vector(x: DVec3, corners: [DVec3; 3], towards: DVec3) -> DVec3 {
-    let mut sum = DVec3::ZERO;
+/// Irradiance vector of a triangle of radiosity 1, of either side, above the plane through x. [Arvo1995 Eq. 2.5]
+fn triangle_vector(x: DVec3, normal: DVec3, corners: [DVec3; 3]) -> DVec3 {
+    let mut polygon = Vec::new();
     for k in 0..3 {
-        let (p, q) = ((corners[k] - x).normalize(), (corners[(k + 1) % 3] - x).normalize());
+        let (p, q) = (corners[k] - x, corners[(k + 1) % 3] - x);
+        let (above_p, above_q) = (p.dot(normal), q.dot(normal));
+        if above_p > 0.0 {
+            polygon.push(p);
+        }
+        if (above_p > 0.0) != (above_q > 0.0) {
+            polygon.push(p.lerp(q, above_p / (above_p - above_q)));
+        }
+    }
+    let mut sum = DVec3::ZERO;
+    for k in 0..polygon.len() {
+        let (p, q) = (polygon[k].normalize_or_zero(), polygon[(k + 1) % polygon.len()].normalize_or_zero());
         sum += p.cross(q).normalize_or_zero() * p.dot(q).clamp(-1.0, 1.0).acos() / (2.0 * PI);
     }
-    if sum.dot(towards) < 0.0 { -sum } else { sum }
+    if sum.dot(normal) < 0.0 { -sum } else { sum }
 }
 
 /// What says whether light passes.
@@ -131,6 +169,9 @@ fn past_cluster(
     }
 }
 
+/// Thresholds of light behind blocked rays that is looked for in the halves.
+const WORTH_LOOKING_ON: f64 = 5.0;
+
 /// Settings of a pass of light.
 #[derive(Clone, Copy)]
 pub struct Way {
@@ -177,13 +218,13 @@ impl Reaching {
         (a, shooter): (&FaceElement, Option<&FaceElement>),
         way: &Way,
         free: impl Fn(usize) -> f64,
-        (rays, split, node): (usize, u32, usize),
+        (split, node): (u32, usize),
     ) -> Outcome {
         let most = self.greatest.iter().copied().fold(0.0, f64::max);
         let stake = f64::from(a.most_albedo) * most / way.threshold;
         let bend = most / (way.bent_light * f64::from(a.area));
         let mut quotients = vec![stake];
-        let bends = |e: &FaceElement| vector_area(e) < 0.7 * f64::from(e.area) && t.children(e.cluster).is_some();
+        let bends = |e: &FaceElement| is_bent(e) && t.children(e.cluster).is_some();
         let bent = [(Some(a), SPLIT_RECEIVER), (shooter, SPLIT_SHOOTER)].into_iter();
         if let Some((_, decision)) = bent.into_iter().find(|(e, _)| e.is_some_and(bends)) {
             quotients.push(bend);
@@ -193,11 +234,9 @@ impl Reaching {
         }
         let is_small = stake <= 1.0;
         let shares: Vec<f64> = (0..t.receiver_nodes).map(|r| free(if is_small { node } else { r })).collect();
-        let rays = if is_small { 1 } else { rays };
         if shares.iter().all(|&share| share == 0.0) {
-            quotients.push(stake / (rays as f64 + 2.0));
-            let looks_on = split != DONE && stake > rays as f64 + 2.0;
-            return Outcome::new(if looks_on { split } else { DONE }, quotients);
+            quotients.push(stake / WORTH_LOOKING_ON);
+            return Outcome::new(if stake > WORTH_LOOKING_ON { split } else { DONE }, quotients);
         }
         for (r, &share) in shares.iter().enumerate() {
             self.at_nodes[r].iter_mut().for_each(|v| *v *= share);
@@ -243,9 +282,15 @@ pub fn transport(
         return Outcome::new(DONE, vec![]);
     }
     if receiver == shooter {
-        let share = if a.is_convex != 0 { 0.0 } else { 1.0 - vector_area(a) / f64::from(a.area) };
+        let share = f64::from(a.self_share);
         let stake = f64::from(a.most_albedo * a.area) * brightest * share / way.threshold;
-        return Outcome::new(if can_split(a) && stake > 1.0 { SPLIT_BOTH } else { DONE }, vec![stake]);
+        if can_split(a) && stake > 1.0 {
+            return Outcome::new(SPLIT_BOTH, vec![stake]);
+        }
+        let kept = a.axis_z.as_dvec3() * (share * f64::from(a.area) / stand_in_area(a));
+        let of = |k: usize| unshot[receiver].get(k).map_or(DVec3::ZERO, |b| b.as_dvec3());
+        let arrives = (0..way.functions).map(|k| [0, 1, 2].map(|c| kept * of(k)[c])).collect();
+        return Outcome { decision: DONE, arrives: (share > 0.0).then_some(arrives), quotients: vec![stake] };
     }
     if !may_face(a, b) || !may_face(b, a) {
         return Outcome::new(DONE, vec![]);
@@ -262,25 +307,27 @@ pub fn transport(
     for r in 0..t.receiver_nodes {
         let x = nodes[receiver][r].as_dvec3();
         let (mut vectors, mut sum) = ([DVec3::ZERO; 3], 0.0);
-        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        let (mut low, mut high, mut sends) = (f64::INFINITY, 0.0f64, false);
         for (e, rule) in shooter_rule.iter().enumerate() {
             let d = nodes[shooter][t.receiver_nodes + e].as_dvec3() - x;
-            let (squared, direction) = (d.length_squared(), d.normalize());
+            let squared = d.length_squared().max(1e-20);
+            let direction = d / squared.sqrt();
             let scale = sent[e].max_element() / (PI * squared);
             low = low.min(scale * least_area(b, -direction) * least_area(a, direction));
             high = high.max(scale * most_area(b, -direction) * most_area(a, direction));
-            if direction.dot(a.axis_z.as_dvec3()) > 0.0 {
-                let share = f64::from(rule.weight) * least_area(b, -direction) / (PI * squared);
-                sum += share;
-                (0..3).for_each(|c| vectors[c] += share * sent[e][c] * direction);
-            }
+            let share = f64::from(rule.weight) * projected_area(b, -direction) / (PI * squared);
+            let kept = share * kept_vector(t, a, direction);
+            sends |= share > 0.0;
+            sum += kept.length();
+            (0..3).for_each(|c| vectors[c] += sent[e][c] * kept);
         }
-        if b.place_count == 1 && sum > 0.0 {
+        if b.place_count == 1 && sends {
             let inst = &t.instances[b.instance as usize];
             let corners = t.corners(t.triangle_at(inst, b.first_place - inst.first_triangle));
-            let exact = triangle_vector(x, corners, b.center.as_dvec3() - x);
-            vectors = [0, 1, 2].map(|c| exact * sent[0][c]);
+            let exact = triangle_vector(x, a.axis_z.as_dvec3(), corners);
             sum = exact.length();
+            let kept = if sum > 0.0 { sum * kept_vector(t, a, exact / sum) } else { DVec3::ZERO };
+            vectors = [0, 1, 2].map(|c| kept * sent[0][c]);
         }
         at_nodes.push(vectors.map(|v| v / sum.max(1.0)));
         least.push(low);
@@ -291,8 +338,11 @@ pub fn transport(
     let turn = (a.cluster * 7 + b.cluster * 13) as usize;
     let passed = [[a.first_place, a.place_count], [b.first_place, b.place_count]];
     let ray = |r: usize, k: usize| {
-        let y = nodes[shooter][t.receiver_nodes + (turn + k) % shooter_rule.len()].as_dvec3();
-        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), nodes[receiver][r].as_dvec3(), y)
+        let x = nodes[receiver][r].as_dvec3();
+        let in_turn = (0..shooter_rule.len()).map(|e| (turn + k + e) % shooter_rule.len());
+        let ys: Vec<DVec3> = in_turn.map(|e| nodes[shooter][t.receiver_nodes + e].as_dvec3()).collect();
+        let above = ys.iter().find(|y| (**y - x).dot(a.axis_z.as_dvec3()) > 0.0);
+        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, *above.unwrap_or(&ys[ys.len() - 1]))
     };
     let reaching = Reaching { at_nodes, least, greatest, channel };
     let stake = f64::from(a.most_albedo) * reaching.greatest.iter().copied().fold(0.0, f64::max) / way.threshold;
@@ -306,7 +356,14 @@ pub fn transport(
         (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
-    reaching.decided(t, (a, Some(b)), way, free, (t.receiver_nodes * way.rays_per_node, split, turn % t.receiver_nodes))
+    let mut outcome = reaching.decided(t, (a, Some(b)), way, free, (split, turn % t.receiver_nodes));
+    // Level with the receiver's plane single precision may take another node for a ray.
+    let (from, to) = (&nodes[receiver][..t.receiver_nodes], &nodes[shooter][t.receiver_nodes..]);
+    let is_level = |x: &Vec3, y: &Vec3| (*y - *x).dot(a.axis_z).abs() < 1e-5 * (*y - *x).length();
+    if from.iter().any(|x| to.iter().any(|y| is_level(x, y))) {
+        outcome.quotients.push(1.0);
+    }
+    outcome
 }
 
 /// `transport_lights`: a directional light's or a point light's.
@@ -331,8 +388,8 @@ pub fn transport_light(
         let (direction, arrives, _) = of(r);
         least.push(arrives.max_element() * least_area(a, direction));
         greatest.push(arrives.max_element() * most_area(a, direction));
-        let faces = direction.dot(a.axis_z.as_dvec3()) > 0.0;
-        at_nodes.push([0, 1, 2].map(|c| if faces { direction * arrives[c] } else { DVec3::ZERO }));
+        let kept = kept_vector(t, a, direction);
+        at_nodes.push([0, 1, 2].map(|c| kept * arrives[c]));
     }
     let reaching = Reaching {
         channel: (0..3).find(|&c| light.intensity[c] == light.intensity.max_element()).unwrap(),
@@ -351,5 +408,5 @@ pub fn transport_light(
         visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
     };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
-    reaching.decided(t, (a, None), way, free, (t.receiver_nodes, split, a.cluster as usize % t.receiver_nodes))
+    reaching.decided(t, (a, None), way, free, (split, a.cluster as usize % t.receiver_nodes))
 }

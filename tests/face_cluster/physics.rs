@@ -131,7 +131,7 @@ fn an_even_sky_gives_pi_times_its_radiance() {
 /// What is lost is the error that the threshold lets pass: it falls with the threshold.
 #[test]
 fn energy_of_the_cornell_box_is_absorbed_or_escapes() {
-    let lost = [1e-4, 1e-5].map(lost_of_what_is_shot);
+    let lost = [1e-3, 1e-5].map(lost_of_what_is_shot);
     assert!(lost[1].abs() < 0.01 && lost[1].abs() < 0.8 * lost[0].abs(), "{lost:?}");
 }
 
@@ -185,7 +185,7 @@ fn lost_of_what_is_shot(threshold: f32) -> f64 {
 }
 
 /// A direction by the cosine law.
-fn around(normal: Vec3, random: &mut Random) -> Vec3 {
+pub fn around(normal: Vec3, random: &mut Random) -> Vec3 {
     let (r, phi) = (random.unit().sqrt(), 2.0 * PI * random.unit());
     let (s, t) = normal.any_orthonormal_pair();
     s * (r * phi.cos()) + t * (r * phi.sin()) + normal * (1.0 - r * r).max(0.0).sqrt()

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 use linklight::gpu::shaders::types::{ClusterInstance, CubatureNode, FaceCluster, FaceElement};
-use linklight::stages::clusters::{CONVEX, measure::decode_color};
+use linklight::stages::clusters::{face_count, hollowness, measure::decode_color};
 
 pub const NONE: u32 = u32::MAX;
 
@@ -39,7 +39,7 @@ impl Tables {
 }
 
 pub fn count(cluster: &FaceCluster) -> u32 {
-    cluster.face_count & !CONVEX
+    face_count(cluster)
 }
 
 pub fn turn(cluster: &FaceCluster) -> DQuat {
@@ -65,7 +65,7 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         facing.swap(0, 1);
         facing.swap(2, 3);
     }
-    let is_flat = (c.facing[4] - c.facing[5]) / c.area.max(1e-30) > 1.0 - 1e-6;
+    let flat_share = (c.facing[4] - c.facing[5]) / c.area.max(1e-30);
     FaceElement {
         cluster,
         instance,
@@ -74,7 +74,7 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         level,
         first_place: inst.first_triangle + c.first_face,
         place_count: count(c),
-        is_convex: u32::from(c.face_count & CONVEX != 0 && (!is_back || is_flat)),
+        self_share: if is_back { 1.0 } else { hollowness(c) } * (1.0 - flat_share).clamp(0.0, 1.0),
         center: (linear * c.center.as_dvec3() + at).as_vec3(),
         axis_x: axis(0),
         axis_y: axis(1),

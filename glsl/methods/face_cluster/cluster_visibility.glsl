@@ -46,7 +46,7 @@ float free_share(vec3 x, vec3 y, float width)
         uint node = inst.first_cluster, end = cluster_skips[node];
         while (node < end && share > 1e-3) {
             FaceCluster c = clusters[node];
-            uint first = inst.first_triangle + c.first_face, count = c.face_count & ~CLUSTER_IS_CONVEX;
+            uint first = inst.first_triangle + c.first_face, count = face_count(c);
             uint skip = cluster_skips[node];
             vec4 to_box = vec4(-c.rotation.xyz, c.rotation.w);
             vec3 o = rotated(to_box, origin - c.center), d = rotated(to_box, way);

@@ -54,7 +54,7 @@ vec3 laid_on_faces(ClusterInstance inst, uint cluster, vec3 point)
         cluster = dot(to_left, to_left) <= dot(to_right, to_right) ? left : right;
     }
     FaceCluster c = clusters[cluster];
-    if ((c.face_count & ~CLUSTER_IS_CONVEX) > 1) return inst.world_from_tree * vec4(clamped_to_box(c, q), 1.0);
+    if (face_count(c) > 1) return inst.world_from_tree * vec4(clamped_to_box(c, q), 1.0);
     uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + c.first_face]];
     vec3 p0 = positions[v.x], p1 = positions[v.y], p2 = positions[v.z];
     // Off the border, which other faces share: rays along it would meet them.
@@ -74,10 +74,10 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
     e.children = NO_FACE_ELEMENT;
     e.level = level;
     e.first_place = inst.first_triangle + c.first_face;
-    e.place_count = c.face_count & ~CLUSTER_IS_CONVEX;
-    // Seen from behind only a flat cluster stays convex.
+    e.place_count = face_count(c);
+    // What bulges is hollow from behind.                                                      [Gobbetti2003 3.3.3]
     float flat_share = (c.facing[4] - c.facing[5]) / max(c.area, 1e-30);
-    e.is_convex = (c.face_count & CLUSTER_IS_CONVEX) != 0 && (!back || flat_share > 1.0 - 1e-6) ? 1 : 0;
+    e.self_share = (back ? 1.0 : hollowness(c)) * clamp(1.0 - flat_share, 0.0, 1.0);
     e.center = inst.world_from_tree * vec4(c.center, 1.0);
     e.axis_x = axes * rotated(c.rotation, vec3(1, 0, 0));
     e.axis_y = axes * rotated(c.rotation, vec3(0, 1, 0));

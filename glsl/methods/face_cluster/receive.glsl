@@ -65,6 +65,23 @@ vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER
 // Whether the element's cluster has smaller ones below it.
 bool can_split(FaceElement e) { return cluster_skips[e.cluster] != e.cluster + 1; }
 
+// Thresholds of light behind blocked rays that is looked for in the halves: where all rays were free, the like of it
+// passes unnoticed.
+const float WORTH_LOOKING_ON = 5.0;
+// Least vector area that stands for all of an element, as a share of its area.
+const float LEAST_FLAT_SHARE = 0.5;
+
+// Irradiance vector that a receiver keeps of light 1 from a unit direction: what its vector area is not hit by but its
+// faces are lies along the mean normal. From behind that alone is kept, unless the receiver has smaller ones below that
+// know better.
+vec3 kept_vector(FaceElement e, vec3 direction)
+{
+    float along = dot(e.axis_z, direction);
+    if (is_bent(e) && can_split(e)) return direction;
+    float beyond = projected_area(e, direction) - vector_area(e) * max(along, 0.0);
+    return (along > 0.0 ? direction : vec3(0.0)) + beyond / max(vector_area(e), LEAST_FLAT_SHARE * e.area) * e.axis_z;
+}
+
 // What arrived at the receiver's nodes (a column a channel), on its functions.                 [Gobbetti2003 Eq. 7]
 void project(mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions[IRRADIANCE_FUNCTIONS])
 {

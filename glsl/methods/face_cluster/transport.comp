@@ -2,6 +2,7 @@
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
 #include "methods/face_cluster/receive.glsl"
+#include "methods/face_cluster/triangle_vector.glsl"
 
 // One thread per (receiver, shooter) pair of the step: transports the shooter's unshot light if the bounds on what the
 // receiver reflects of it are tight enough, else says which of them is to be split.            [Gobbetti2003 3.3]
@@ -21,20 +22,6 @@ layout(push_constant, scalar) uniform Params {
 
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
 
-// Irradiance vector at x of a triangle of radiosity 1 that faces it: its edges' angles along their normals.
-//                                                                                              [Arvo1995 Eq. 2.5]
-vec3 triangle_vector(vec3 x, vec3 corners[3], vec3 towards)
-{
-    vec3 sum = vec3(0.0);
-    [[dont_unroll]] for (uint k = 0; k < 3; ++k) {
-        vec3 p = corners[k] - x, q = corners[(k + 1) % 3] - x;
-        vec3 across = cross(p, q);
-        float sine = length(across);
-        if (sine > 0.0) sum += across * (atan(sine, dot(p, q)) / (sine * 2.0 * PI));
-    }
-    return dot(sum, towards) < 0.0 ? -sum : sum;
-}
-
 void main()
 {
     uint i = linear_index();
@@ -51,8 +38,17 @@ void main()
 
     if (receiver == shooter) {
         // Self transfer: what a cluster that is not convex may send itself.                    [Gobbetti2003 3.3.3]
-        float self_share = a.is_convex != 0 ? 0.0 : 1.0 - vector_area(a) / max(a.area, 1e-30);
-        if (can_split(a) && a.most_albedo * brightest * self_share * a.area > params.threshold) decisions[i] = SPLIT_BOTH;
+        float power = a.self_share * a.area;
+        if (can_split(a) && a.most_albedo * brightest * power > params.threshold) {
+            decisions[i] = SPLIT_BOTH;
+        } else if (power > 0.0) {
+            // Where it comes from within the cluster is not known: along the mean normal.
+            mat3 on_functions[IRRADIANCE_FUNCTIONS];
+            vec3 kept = power / max(vector_area(a), LEAST_FLAT_SHARE * a.area) * a.axis_z;
+            [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+                on_functions[k] = k < RADIOSITY_FUNCTIONS ? outerProduct(kept, unshot[shooter * RADIOSITY_FUNCTIONS + k]) : mat3(0.0);
+            receive(receiver, on_functions, params.units);
+        }
         return;
     }
     if (!may_face(a, b) || !may_face(b, a)) return;
@@ -83,30 +79,33 @@ void main()
         least[r] = 3e38;
         greatest[r] = 0.0;
         float sum = 0.0;
+        bool sends = false;
         [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
             vec3 d = shooter_node(shooter, e) - x;
             float squared = max(dot(d, d), 1e-20);
             vec3 direction = d / sqrt(squared);
-            float sent = least_projected_area(b, -direction), scale = most(radiosity[e]) / (PI * squared);
-            least[r] = min(least[r], scale * sent * least_projected_area(a, direction));
+            float scale = most(radiosity[e]) / (PI * squared);
+            least[r] = min(least[r], scale * least_projected_area(b, -direction) * least_projected_area(a, direction));
             greatest[r] = max(greatest[r], scale * most_projected_area(b, -direction) * most_projected_area(a, direction));
-            // m(x, y) B(y); nothing from below the receiver's own plane.                       [Gobbetti2003 Eq. 3]
-            if (dot(direction, a.axis_z) <= 0.0) continue;
-            float share = rules[RECEIVER_NODES + e].weight * sent / (PI * squared);
-            sum += share;
-            at_nodes[r] += outerProduct(share * direction, radiosity[e]);
+            // m(x, y) B(y).                                                                    [Gobbetti2003 Eq. 3]
+            float share = rules[RECEIVER_NODES + e].weight * projected_area(b, -direction) / (PI * squared);
+            vec3 kept = share * kept_vector(a, direction);
+            sends = sends || share > 0.0;
+            sum += length(kept);
+            at_nodes[r] += outerProduct(kept, radiosity[e]);
         }
-        if (is_face && sum > 0.0) {
-            vec3 exact = triangle_vector(x, corners, b.center - x);
-            at_nodes[r] = outerProduct(exact, radiosity[0]);
+        if (is_face && sends) {
+            vec3 exact = triangle_vector(x, a.axis_z, corners);
+            if (dot(exact, a.axis_z) < 0.0) exact = -exact;
             sum = length(exact);
+            at_nodes[r] = sum > 0.0 ? outerProduct(sum * kept_vector(a, exact / sum), radiosity[0]) : mat3(0.0);
         }
         // No surface receives more than a hemisphere of the shooter's light.
         if (sum > 1.0) at_nodes[r] /= sum;
         greatest_of_all = max(greatest_of_all, greatest[r]);
     }
-    // Nothing is kept from behind the mean normal of a receiver, and nothing sent from behind a shooter's: where that is
-    // too much light, faces must be met apart, small as they are.
+    // What lights a receiver from many sides cancels in one vector, and a shooter is not as bright on all its sides: where
+    // that is too much light, faces must be met apart, small as they are.
     bool splits_a = is_bent(a) && can_split(a), splits_b = is_bent(b) && can_split(b);
     if ((splits_a || splits_b) && greatest_of_all > params.bent_light * a.area) {
         decisions[i] = splits_a ? SPLIT_RECEIVER : SPLIT_SHOOTER;
@@ -123,7 +122,12 @@ void main()
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
     [[dont_unroll]] for (uint k = 0; k < ray_count; ++k) {
         uint r = is_small ? turn % RECEIVER_NODES : k % RECEIVER_NODES;
-        vec3 x = receiver_node(receiver, r), y = shooter_node(shooter, (turn + k) % SHOOTER_NODES);
+        vec3 x = receiver_node(receiver, r), y;
+        // To a node above the receiver's plane, if there is one.
+        [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
+            y = shooter_node(shooter, (turn + k + e) % SHOOTER_NODES);
+            if (dot(y - x, a.axis_z) > 0.0) break;
+        }
         Ray ray = Ray(x, 1e-4, y - x, 1.0 - 1e-4);
         float share = visibility(a, ray);
         any_free = any_free || share > 0.0;
@@ -133,9 +137,8 @@ void main()
     uint split = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
     bool may_split = can_split(a) || can_split(b);
     if (!any_free) {
-        // After n blocked rays a share of 1 / (n + 2) is still to be expected free, if all shares are alike: where
-        // that is too much to lose, it is looked for in the halves.
-        if (may_split && a.most_albedo * greatest_of_all > params.threshold * float(ray_count + 2)) decisions[i] = split;
+        // What few rays miss is not dark: where that is too much to lose, it is looked for in the halves.
+        if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = split;
         return;
     }
     float only = free[turn % RECEIVER_NODES] * float(params.rays_per_node);

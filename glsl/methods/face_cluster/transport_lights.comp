@@ -47,7 +47,7 @@ void main()
         least[r] = most(arrives) * least_projected_area(a, direction);
         greatest[r] = most(arrives) * most_projected_area(a, direction);
         greatest_of_all = max(greatest_of_all, greatest[r]);
-        at_nodes[r] = dot(direction, a.axis_z) > 0.0 ? outerProduct(direction, arrives) : mat3(0.0);
+        at_nodes[r] = outerProduct(kept_vector(a, direction), arrives);
     }
     // Nothing is kept from behind the mean normal: what many faces look at must find them apart, small as they are.
     if (is_bent(a) && can_split(a) && greatest_of_all > params.bent_light * a.area) {
@@ -71,7 +71,7 @@ void main()
     atomicAdd(pool[0].rays, is_small ? 1 : RECEIVER_NODES);
     if (!any_free) {
         // As in transport: what may still be free is looked for where it is too much to lose.
-        if (can_split(a) && a.most_albedo * greatest_of_all > params.threshold * float(RECEIVER_NODES + 2)) decisions[i] = SPLIT_RECEIVER;
+        if (can_split(a) && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = SPLIT_RECEIVER;
         return;
     }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {

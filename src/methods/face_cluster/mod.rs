@@ -27,7 +27,9 @@
 //! cubature nodes are laid on the faces, and a shooter of one face is measured exactly;
 //! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
 //! is too small to matter, since one normal would leave half of them dark; a transfer takes one shadow ray per receiver node unless told otherwise;
-//! (1 - F_ii) is not applied, since the vector area already holds it; while light is shot, inner elements have room for
+//! transfers are made with the projected area expected between its bounds, not the lower bound, and what faces get beyond
+//! their vector area lies along the mean normal; (1 - F_ii) is not applied to what is reflected: F_ii of it is shot at
+//! the cluster itself, F_ii being less than its bound where faces lean outwards; while light is shot, inner elements have room for
 //! irradiance too, but a [`Solution`] is of leaves alone.
 //!
 //! [Gobbetti2003]: crate::methods::PAPERS
@@ -84,7 +86,7 @@ crate::settings! {
         threshold: f32 = 1e-5, range 1e-9..=1.0, paper "1e-5 of all emitted power";
         /// Light at which a receiver or shooter whose faces look many ways is split whatever its power, as a share of the
         /// mean irradiance that its pass of light would give all surfaces.
-        bent_light: f32 = 0.02, range 0.0..=1e6, paper "not done";
+        bent_light: f32 = 0.002, range 0.0..=1e6, paper "not done";
         /// Functions that vector irradiance is stored on.
         irradiance_basis: Basis = Basis::Linear, paper "constant, linear or quadratic";
         /// Functions that unshot radiosity is stored on: no more than those of irradiance.

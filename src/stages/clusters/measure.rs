@@ -5,7 +5,7 @@
 //! bounds are bounds.                                                                    [Gobbetti2003 3.1]
 
 use super::forest::Forest;
-use super::{CONVEX, MeshFaces};
+use super::{FACE_COUNT_BITS, MeshFaces};
 use crate::gpu::shaders::types::FaceCluster;
 use crate::scene::calipers;
 use glam::{DVec3, Mat3, Quat, Vec2, Vec3};
@@ -74,8 +74,10 @@ fn measure_subtree(
         outline.extend(others);
         (thin(outline), normal)
     };
-    let convex = if forest.convex[first] { CONVEX } else { 0 };
-    out[0] = cluster(own, &outline, fallback, first_face, count | convex);
+    out[0] = cluster(own, &outline, fallback, first_face);
+    if !forest.convex[first] {
+        out[0].face_count |= ((15.0 * hollowness(own)).round() as u32).max(1) << FACE_COUNT_BITS;
+    }
     let normal = super::axes(&out[0]).z_axis;
     (outline, normal)
 }
@@ -100,7 +102,7 @@ fn thin(points: Vec<Vec3>) -> Vec<Vec3> {
     kept.into_iter().map(|k| points[k]).collect()
 }
 
-fn cluster(faces: &[Face], outline: &[Vec3], fallback: Vec3, first_face: u32, face_count: u32) -> FaceCluster {
+fn cluster(faces: &[Face], outline: &[Vec3], fallback: Vec3, first_face: u32) -> FaceCluster {
     let (mut area, mut normal) = (0.0f64, DVec3::ZERO);
     let (mut albedo, mut emission) = (DVec3::ZERO, DVec3::ZERO);
     let (mut albedo_range, mut emission_range) = ([Vec3::MAX, Vec3::ZERO], [Vec3::MAX, Vec3::ZERO]);
@@ -141,8 +143,28 @@ fn cluster(faces: &[Face], outline: &[Vec3], fallback: Vec3, first_face: u32, fa
         emission: mean(emission, emission_range),
         emission_range: emission_range.map(encode_color),
         first_face,
-        face_count,
+        face_count: faces.len() as u32,
     }
+}
+
+/// Whether faces lean outwards from their middle, or as much inwards: from 0 (all outwards) to 1.
+fn hollowness(faces: &[Face]) -> f32 {
+    let (mut area, mut normal, mut center) = (0.0f32, Vec3::ZERO, Vec3::ZERO);
+    let middle = |face: &Face| (face.corners[0] + face.corners[1] + face.corners[2]) / 3.0;
+    for face in faces {
+        area += face.area;
+        normal += face.normal;
+        center += face.area * middle(face);
+    }
+    let scale = 1.0 / area.max(f32::MIN_POSITIVE);
+    let (normal, center) = (normal * scale, center * scale);
+    let (mut outwards, mut all) = (0.0f32, 0.0f32);
+    for face in faces {
+        let lean = (face.normal - face.area * normal).dot(middle(face) - center);
+        outwards += lean;
+        all += lean.abs();
+    }
+    if all > 0.0 { (1.0 - outwards / all).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// x, y by callipers around z. The quaternion's own axes, so that what is stored is what was measured.

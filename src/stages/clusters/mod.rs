@@ -22,8 +22,8 @@ pub mod measure;
 use crate::gpu::shaders::types::FaceCluster;
 use glam::{Mat3, Quat, Vec3, Vec4};
 
-/// Bit of [`FaceCluster::face_count`]: no two faces of the cluster see each other's fronts.
-pub const CONVEX: u32 = 1 << 31;
+/// Lower bits of [`FaceCluster::face_count`] that count faces; the upper four hold [`hollowness`].
+pub const FACE_COUNT_BITS: u32 = 28;
 
 /// Levels of a tree, at most.
 pub const MAX_DEPTH: u32 = 96;
@@ -83,12 +83,13 @@ impl ClusterTree {
 
 /// Faces of the cluster.
 pub fn face_count(cluster: &FaceCluster) -> u32 {
-    cluster.face_count & !CONVEX
+    cluster.face_count & ((1 << FACE_COUNT_BITS) - 1)
 }
 
-/// Whether no face of the cluster sees another's front.
-pub fn is_convex(cluster: &FaceCluster) -> bool {
-    cluster.face_count & CONVEX != 0
+/// Of what the faces send beyond their vector area, the share that strikes the cluster itself: 0 where no face sees
+/// another's front, 1 where the cluster is hollow, or as much so as not.
+pub fn hollowness(cluster: &FaceCluster) -> f32 {
+    (cluster.face_count >> FACE_COUNT_BITS) as f32 / 15.0
 }
 
 /// The box's axes; z along the area-averaged normal.

@@ -1,0 +1,150 @@
+//! Where light goes: what the solver says each part of a scene receives of each other part, beside a plain Monte Carlo
+//! twin that sends rays off the faces themselves.
+
+use crate::common::scenes::{lambert, parallelogram, scene};
+use crate::common::{Random, TestContext};
+use crate::fixture::{Fixture, leaves};
+use crate::physics::around;
+use glam::Vec3;
+use linklight::gpu::shaders::types::Ray;
+use linklight::methods::face_cluster::Settings;
+use linklight::scene::{Material, Primitive, Scene};
+use linklight::stages::trace::{self, BACK_FACE, NO_HIT, Tracer};
+use std::f32::consts::PI;
+
+/// W that the faces of a material receive: by the solver, and by rays.
+#[derive(Clone, Copy, Default)]
+struct Received {
+    solved: f64,
+    by_rays: f64,
+}
+
+/// One row: `emitters` shine with radiance 1; what each material's faces get, and what is sent, W.
+fn row(
+    context: &TestContext,
+    scene: &Scene,
+    emitters: &[usize],
+    settings: Settings,
+    rays: usize,
+) -> (f64, Vec<Received>) {
+    let mut scene = scene.clone();
+    emitters.iter().for_each(|&k| scene.materials[k].emission = Vec3::ONE);
+    let fixture = Fixture::new(context, scene, None);
+    let method = fixture.solve(context, settings, 0);
+    let all = leaves(context, &method);
+    let sides = context.download(method.state().triangle_leaves()).unwrap();
+    let material_of = |triangle: usize| {
+        let part = fixture.geometry.parts.iter().find(|p| {
+            (p.triangle_offset as usize..(p.triangle_offset + p.triangle_count) as usize).contains(&triangle)
+        });
+        part.unwrap().material as usize
+    };
+    let material_of: Vec<usize> = (0..fixture.geometry.triangles.len()).map(material_of).collect();
+    let mut table = vec![Received::default(); fixture.scene.materials.len()];
+    let mut material_of_leaf = vec![usize::MAX; all.len()];
+    for (t, s) in sides.iter().enumerate() {
+        for leaf in [s.x, s.y] {
+            if leaf != u32::MAX {
+                material_of_leaf[leaf as usize] = material_of[t];
+            }
+        }
+    }
+    for leaf in &all {
+        let power = f64::from(leaf.element.area) * f64::from(leaf.direct.x);
+        table[material_of_leaf[leaf.index as usize]].solved += power;
+    }
+    // Rays off the emitters' fronts.
+    let faces: Vec<usize> = (0..material_of.len()).filter(|&t| emitters.contains(&material_of[t])).collect();
+    let corners = |t: usize| fixture.geometry.triangles[t].map(|v| fixture.positions[v as usize]);
+    let mut cumulative = vec![0.0f64];
+    for &t in &faces {
+        let [a, b, c] = corners(t);
+        cumulative.push(cumulative.last().unwrap() + 0.5 * f64::from((b - a).cross(c - a).length()));
+    }
+    let area = *cumulative.last().unwrap();
+    let mut random = Random(7);
+    let rays: Vec<Ray> = (0..rays)
+        .map(|k| {
+            let at = area * (k as f64 + f64::from(random.unit())) / rays as f64;
+            let face = (cumulative.partition_point(|&sum| sum <= at) - 1).min(faces.len() - 1);
+            let [a, b, c] = corners(faces[face]);
+            let (u, v) = (random.unit().sqrt(), random.unit());
+            let origin = a * (1.0 - u) + b * (u * (1.0 - v)) + c * (u * v);
+            let normal = (b - a).cross(c - a).normalize_or(Vec3::Y);
+            Ray {
+                origin: origin + 1e-5 * normal,
+                t_min: 0.0,
+                direction: around(normal, &mut random),
+                t_max: f32::INFINITY,
+            }
+        })
+        .collect();
+    let (device_rays, hits) =
+        (context.upload("test/rays", &rays).unwrap(), context.buffer("test/hits", rays.len()).unwrap());
+    let mut recorder = context.recorder("test").unwrap();
+    trace::closest_hit(&mut recorder, &Tracer::compute(&fixture.bvh, &fixture.world), &device_rays, &hits, rays.len());
+    recorder.submit().unwrap();
+    let power = f64::from(PI) * area / rays.len() as f64;
+    for hit in context.download(&hits).unwrap() {
+        if hit.triangle == NO_HIT {
+            continue;
+        }
+        let t = (hit.triangle & !BACK_FACE) as usize;
+        let leaf = if hit.triangle & BACK_FACE == 0 { sides[t].x } else { sides[t].y };
+        if leaf != u32::MAX {
+            table[material_of[t]].by_rays += power;
+        }
+    }
+    (f64::from(PI) * area, table)
+}
+
+/// A closed body of the places that `at` gives a grid, wound outwards.
+fn body(cells: u32, material: u32, at: impl Fn(f32, f32) -> Vec3) -> Primitive {
+    let mut body = parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y, cells, material);
+    body.positions.iter_mut().for_each(|p| *p = at(p.x, p.y));
+    let p = &body.positions;
+    let volume: f32 = body.triangles.iter().map(|t| t.map(|v| p[v as usize])).map(|[a, b, c]| a.dot(b.cross(c))).sum();
+    if volume < 0.0 {
+        body.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    body
+}
+
+/// A room of side 2 with a ball and a post: walls, ball, post.
+fn furnished_room() -> Scene {
+    let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
+    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
+    let wall = |corner: Vec3, u: Vec3, v: Vec3| parallelogram(corner, u, v, 10, 0);
+    let zero = Vec3::ZERO;
+    let walls = [wall(zero, x, y), wall(z, y, x), wall(zero, y, z), wall(x, z, y), wall(zero, z, x), wall(y, x, z)];
+    let on_sphere = |u: f32, v: f32| {
+        let (around, down) = (2.0 * PI * u, PI * v);
+        Vec3::new(down.sin() * around.cos(), down.cos(), down.sin() * around.sin())
+    };
+    let ball = body(16, 1, |u, v| Vec3::new(0.6, 0.7, 0.7) + 0.35 * on_sphere(u, v));
+    // A ball pressed into a box.
+    let boxed = |p: Vec3| p.clamp(Vec3::splat(-0.5), Vec3::splat(0.5));
+    let post = body(16, 2, |u, v| Vec3::new(1.4, 0.61, 1.3) + Vec3::new(0.4, 1.2, 0.4) * boxed(1.2 * on_sphere(u, v)));
+    scene(vec![material(0.7), material(0.6), material(0.5)], walls.into_iter().chain([ball, post]).collect(), &[])
+}
+
+/// Closed bodies send and take all their light, however little of it meets a shooter or receiver as a whole: their
+/// vector areas are nothing.
+#[test]
+fn parts_receive_what_rays_off_the_faces_say() {
+    let context = TestContext::new();
+    let room = furnished_room();
+    for (emitters, tolerance) in [(vec![0, 1, 2], 0.03), (vec![1], 0.06), (vec![2], 0.06)] {
+        let (sent, table) = row(&context, &room, &emitters, Settings::default(), 100_000);
+        let total = table.iter().fold(Received::default(), |sum, r| Received {
+            solved: sum.solved + r.solved,
+            by_rays: sum.by_rays + r.by_rays,
+        });
+        println!("{emitters:?} send {sent:.3} W; rays say {:.3}, the solver {:.3}", total.by_rays, total.solved);
+        for (part, r) in ["walls", "ball", "post"].iter().zip(&table) {
+            println!("    {part}: {:.3} by rays, {:.3} solved, ratio {:.3}", r.by_rays, r.solved, r.solved / r.by_rays);
+        }
+        assert!((total.by_rays / sent - 1.0).abs() < 0.02, "the room is closed: {} of {sent}", total.by_rays);
+        assert!((total.solved / total.by_rays - 1.0).abs() < tolerance, "{} of {}", total.solved, total.by_rays);
+    }
+}
