@@ -57,7 +57,13 @@ impl Frame {
 }
 
 /// Whole frames with one bounce of a built-in scene; the fastest of all rounds, and the method as it stands.
-fn frames(context: &Context, name: &str, elements: u32, settings: Settings) -> (Frame, ImplicitVisibility) {
+fn frames(
+    context: &Context,
+    name: &str,
+    elements: u32,
+    settings: Settings,
+    rounds: usize,
+) -> (Frame, ImplicitVisibility) {
     let bytes = match builtin::resolve(name) {
         Ok(Source::File(bytes)) => bytes,
         other => panic!("{name}: {other:?}"),
@@ -82,7 +88,7 @@ fn frames(context: &Context, name: &str, elements: u32, settings: Settings) -> (
     let mut method = ImplicitVisibility::prepare(context, &stage, settings).unwrap();
     let mut fastest: Option<Frame> = None;
     // The first frame holds the driver's compile time.
-    for round in 0..=ROUNDS {
+    for round in 0..=rounds {
         context.take_records();
         method.link(context, &stage).unwrap();
         let mut recorder = context.recorder("frame").unwrap();
@@ -103,7 +109,7 @@ const PAPER: [(u32, [f64; 4]); 3] =
 fn stages(_: &mut Criterion) {
     let context = Context::new(Options::default()).unwrap();
     for (bins, paper) in PAPER {
-        let (frame, method) = frames(&context, "cornell-box", 3_400, Settings { bins, ..Settings::default() });
+        let (frame, method) = frames(&context, "cornell-box", 3_400, Settings { bins, ..Settings::default() }, ROUNDS);
         let share = |ms: f64| format!("{ms:.1} ms ({:.0} %)", 100.0 * ms / frame.total());
         let report = method.report();
         let rate = |count: u64| count as f64 / frame.create * 1e-3;
@@ -127,9 +133,10 @@ fn stages(_: &mut Criterion) {
 /// Whole frames from 3,000 to 100,000 elements: the exponent of N log N that fits, and memory.
 fn growth(_: &mut Criterion) {
     let mut points: Vec<(f64, f64)> = Vec::new();
-    for elements in [3_000, 10_000, 30_000, 100_000] {
+    for (elements, rounds) in [(3_000, ROUNDS), (10_000, ROUNDS), (30_000, 2), (100_000, 1)] {
         let context = Context::new(Options::default()).unwrap();
-        let (frame, method) = frames(&context, "cornell-box", elements, Settings { bins: 8, ..Settings::default() });
+        let (frame, method) =
+            frames(&context, "cornell-box", elements, Settings { bins: 8, ..Settings::default() }, rounds);
         let report = method.report();
         let count = f64::from(report.elements);
         let memory = context.memory_by_owner();
@@ -148,6 +155,7 @@ fn growth(_: &mut Criterion) {
             report.winner_bytes as f64 / (count * f64::from(report.bins)),
             mebibytes("implicit/keys"),
         );
+        assert!(mebibytes("") < 2048.0, "{count} elements take {:.0} MiB, more than 2 GiB", mebibytes(""));
         points.push(((count * count.log2()).ln(), frame.total().ln()));
     }
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / points.len() as f64;
@@ -155,6 +163,7 @@ fn growth(_: &mut Criterion) {
     let slope = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum::<f64>()
         / points.iter().map(|p| (p.0 - x).powi(2)).sum::<f64>();
     println!("frame time grows with (N log N) to the power {slope:.2}");
+    assert!(slope < 1.15, "time grows faster than O(N log N)");
 }
 
 fn gather(criterion: &mut Criterion) {
@@ -162,7 +171,7 @@ fn gather(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("gather bins");
     group.sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_secs(1));
     let settings = Settings::default();
-    let (frame, method) = frames(&context, "cornell-box", 8_000, settings);
+    let (frame, method) = frames(&context, "cornell-box", 8_000, settings, ROUNDS);
     let window = &method.linking().windows[0];
     let (winners, count) = (context.download(&window.winners).unwrap(), window.plan.leaves().len());
     let rows: Vec<Vec<u32>> =
