@@ -4,6 +4,7 @@ use crate::common::TestContext;
 use crate::fixture::{Fixture, builtin_scene, solve, winners};
 use crate::twins;
 use glam::Vec3;
+use linklight::gpu::shaders::types::Surfel;
 use linklight::methods::implicit_visibility::{ImplicitVisibility, Settings, bins};
 use linklight::scene::environment::Environment;
 use linklight::scene::pose::Pose;
@@ -27,6 +28,8 @@ struct Agreement {
     farther: usize,
     /// Of both and of the empty ones: no edge of anything passes through the bin or those around it.
     unexplained: usize,
+    /// Of all: one does.
+    at_edges: usize,
 }
 
 impl Agreement {
@@ -35,20 +38,21 @@ impl Agreement {
     }
 }
 
-/// Whether the distances around a bin jump by more than a tenth, or something else begins, so that an edge passes there.
-fn is_at_an_edge(row: &[(f64, u32)], bin: usize, n: u32) -> bool {
+/// Whether what is seen around a bin leaves the plane of the surface seen in it by more than a tenth of the distance, so
+/// that an edge passes there.
+fn is_at_an_edge(row: &[(f64, u32)], bin: usize, n: u32, own: &Surfel, origin: Vec3) -> bool {
     let face = bin as u32 / (n * n);
     let direction = twins::directions(n)[bin];
     let axis = (face / 2) as usize;
     let uv = [(axis + 1) % 3, (axis + 2) % 3].map(|k| direction[k] / direction[axis].abs());
     let step = 2.0 / f64::from(n);
-    let around = (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (f64::from(du) * step, f64::from(dv) * step)));
-    let distances = around.map(|(du, dv)| {
-        let towards = bins::face_direction(face, uv[0] + du, uv[1] + dv).as_vec3();
-        row[bins::bin_of(towards, n) as usize].0
-    });
-    let (low, high) = distances.fold((f64::INFINITY, 0.0f64), |(low, high), d| (low.min(d), high.max(d)));
-    high > 1.1 * low
+    let height = f64::from(own.normal.dot(own.centre - origin));
+    (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (f64::from(du) * step, f64::from(dv) * step))).any(|(du, dv)| {
+        let towards = bins::face_direction(face, uv[0] + du, uv[1] + dv).as_vec3().normalize();
+        let beside = bins::bin_of(towards, n) as usize;
+        let on_plane = height / twins::directions(n)[beside].dot(own.normal.as_dvec3());
+        (on_plane / row[beside].0 - 1.0).abs() > 0.1
+    })
 }
 
 fn expected(context: &TestContext, fixture: &Fixture, method: &ImplicitVisibility) -> Vec<Vec<(f64, u32)>> {
@@ -93,7 +97,10 @@ fn agreement(
                 continue;
             }
             found.filled += 1;
-            let edge = || usize::from(!is_at_an_edge(row, bin, settings.bins));
+            let there = &surfels[(winner & !twins::BACK) as usize];
+            let is_at_edge = is_at_an_edge(row, bin, settings.bins, there, receiver.origin);
+            found.at_edges += usize::from(is_at_edge);
+            let edge = || usize::from(!is_at_edge);
             if own == twins::EMPTY {
                 found.empty += 1;
                 found.unexplained += edge();
@@ -121,7 +128,7 @@ fn agreement(
 #[test]
 fn brute_force_finds_what_rays_would_and_the_hierarchy_next_to_always() {
     let context = TestContext::new();
-    for (name, max_edge, least) in [("cornell-box", Some(0.4), [0.99, 0.998]), ("dancer", None, [0.95, 0.975])] {
+    for (name, max_edge, least) in [("cornell-box", Some(0.4), [0.99, 0.998]), ("dancer", None, [0.97, 0.98])] {
         let fixture = Fixture::new(&context, builtin_scene(name), max_edge);
         let settings = Settings { bins: 8, fill_holes: false, ..Settings::default() };
         let mut expected = Vec::new();
@@ -134,7 +141,8 @@ fn brute_force_finds_what_rays_would_and_the_hierarchy_next_to_always() {
             // The rest stand at silhouettes: a node's place is off by part of a bin, and the bin goes to what is beside.
             assert!(hierarchy.share() > least, "{name}: {hierarchy:?}");
             assert!(hierarchy.empty * 100 < hierarchy.filled, "{name}: {hierarchy:?}");
-            assert!(hierarchy.unexplained * 250 < hierarchy.filled, "{name}: {hierarchy:?}");
+            // Away from edges few differ.
+            assert!(hierarchy.unexplained * 50 < hierarchy.filled - hierarchy.at_edges, "{name}: {hierarchy:?}");
         }
     }
 }

@@ -11,7 +11,8 @@
 // reads receiver_groups, walk_texels[WALK_TEXELS * node_count], surfels[node_count]
 // updates group_walks[group_count], link_counts, unfinished[1] (1: a walk stopped)
 // writes held_senders[KINDS * capacity * group_count]   shared none
-// Differs from [Dong2007]: pairs are directed, and a pair is not queued but found by its receiver's walk.
+// Differs from [Dong2007]: pairs are directed, and a pair is not queued but found by its receiver's walk; bent nodes are
+// refined further.
 layout(local_size_x = 16) in;
 layout(set = 0, binding = 0) uniform usamplerBuffer walk_texels;
 layout(set = 0, binding = 1, scalar) readonly buffer Surfels { Surfel surfels[]; };
@@ -31,22 +32,35 @@ layout(push_constant, scalar) uniform Params {
     uint is_start;          // 1: walks start here
 } params;
 
-// Whether a disc of that extent, seen from `distance_there`, fills no more than its share of the bin that `towards` points
-// into: a bin's solid angle is 4 / n^2 times the cube of the largest component of its unit direction.
-bool fits(float extent, vec3 towards, float distance_there)
+// How much more a sender counts where it is bent: there an ellipse is no good outline.
+const float BENT = 4.0;
+// What flat ones are foreshortened to at most: their ellipses reach beyond them at their rims, and steep ones far.
+const float STEEPEST = 0.5;
+
+// What a sender shows of itself, m2: its disc foreshortened as its cone of normals allows.
+float shown_area(vec3 normal, float sin_cone, float extent, vec3 towards)
+{
+    float foreshortening = clamp(abs(dot(normal, towards)) / length(towards) + sin_cone, STEEPEST, 1.0);
+    return PI * extent * extent * foreshortening * (1.0 + BENT * sin_cone);
+}
+
+// Whether an area, seen from `distance_there`, fills no more than its share of the bin that `towards` points into: a bin's
+// solid angle is 4 / n^2 times the cube of the largest component of its unit direction.
+bool fits(float area, vec3 towards, float distance_there)
 {
     vec3 size = abs(towards) / length(towards);
     float largest = max(size.x, max(size.y, size.z));
     return distance_there > 0.0
-           && PI * extent * extent * float(params.n * params.n)
+           && area * float(params.n * params.n)
                   < 4.0 * params.refinement * largest * largest * largest * distance_there * distance_there;
 }
 
-float widest(uint first, uint count)
+// Of the discs of nodes, m2.
+float largest_area(uint first, uint count)
 {
     float extent = 0.0;
     for (uint k = first; k < first + count; ++k) extent = max(extent, surfels[k].extent);
-    return extent;
+    return PI * extent * extent;
 }
 
 void main()
@@ -57,7 +71,7 @@ void main()
     bool has_above = group.above_count > 0, of_leaves = group.first < params.leaf_count;
     Surfel own = surfels[group.node], above = surfels[has_above ? group.above_node : group.node];
     Extents receiver = Extents(own.normal, own.cos_cone, own.radius, own.thickness);
-    float extent = widest(group.first, group.count), extent_above = widest(group.above_first, group.above_count);
+    float area = largest_area(group.first, group.count), area_above = largest_area(group.above_first, group.above_count);
 
     GroupWalk at = group_walks[slot];
     // Where the walk of the group above did not go further down, and left what is below to its children.
@@ -70,7 +84,8 @@ void main()
         vec4 facing = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * at.step + 1)));
         uvec4 rest = texelFetch(walk_texels, int(WALK_TEXELS * at.step + 2));
         uint sender = rest.x, skip = rest.y;
-        float radius = centre.w, sender_extent = facing.w, thickness = uintBitsToFloat(rest.z);
+        float radius = centre.w, thickness = uintBitsToFloat(rest.z), cos_cone = uintBitsToFloat(rest.w);
+        float sin_cone = cos_cone > 0.0 ? sqrt(1.0 - min(cos_cone * cos_cone, 1.0)) : 1.0;
         bool is_leaf = sender < params.leaf_count;
         ++visited;
 
@@ -80,20 +95,20 @@ void main()
         vec3 from_above = centre.xyz - above.centre;
         float nearest_above = length(from_above) - above.radius;
         bool ends_above = !is_dropped && at.step >= at.left_from_above
-                          && (is_leaf || fits(sender_extent, from_above, nearest_above));
+                          && (is_leaf || fits(shown_area(facing.xyz, sin_cone, facing.w, from_above), from_above, nearest_above));
         at.left_from_above = ends_above ? skip : at.left_from_above;
-        is_dropped = is_dropped || (ends_above && fits(extent_above, from_above, nearest_above));  // that link comes down
+        is_dropped = is_dropped || (ends_above && fits(area_above, from_above, nearest_above));  // that link comes down
 
         float nearest = length(offset) - own.radius;
-        bool is_refined = !is_leaf && !fits(sender_extent, offset, nearest);
+        bool is_refined = !is_leaf && !fits(shown_area(facing.xyz, sin_cone, facing.w, offset), offset, nearest);
         float farthest = nearest + radius;
-        bool may_fit = is_refined ? PI * extent * extent * float(params.n * params.n) < 4.0 * params.refinement * farthest * farthest
-                                  : fits(extent, offset, nearest);
+        bool may_fit = is_refined ? area * float(params.n * params.n) < 4.0 * params.refinement * farthest * farthest
+                                  : fits(area, offset, nearest);
         is_dropped = is_dropped || (!of_leaves && !may_fit);    // left to the children
 
         if (!is_dropped && !is_refined) {
             uint of_leaf = thickness <= FLAT * radius ? OF_FLAT_LEAVES : OF_LEAVES;
-            uint of_node = uintBitsToFloat(rest.w) < 0.5 ? OF_OUTLINES : OF_PLANES;
+            uint of_node = cos_cone < 0.5 ? OF_OUTLINES : OF_PLANES;
             uvec4 is_kind = uvec4(equal(uvec4(0, 1, 2, 3), uvec4(is_leaf ? of_leaf : of_node)));
             uvec4 place = is_kind * (at.held + uvec4(0, 1, 2, 3) * params.capacity);
             held_senders[first + place.x + place.y + place.z + place.w] = sender;
