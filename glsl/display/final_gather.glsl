@@ -72,24 +72,28 @@ EnvironmentCell environment_cell(uint index) { return environment_cells[index]; 
 uvec4 sender_leaf_texel(uint i) { return texelFetch(sender_leaves, int(i)); }
 uvec4 sender_branch_texel(uint i) { return texelFetch(sender_branches, int(i)); }
 
-// One of the environment's directions.
-Arrival environment_arrival(uvec4 random, float share)
+// The `k`-th direction to the environment: by the surface's lobe where the environment is even, and for half of them where
+// the surface has a lobe; else by the environment. Each counts by what both together would draw it with.     [Veach1995]
+Arrival environment_arrival(uint k, uvec4 random)
 {
     EnvironmentInfo env = environment_info[0];
+    Surface s = receiver.surface;
+    bool is_even = env.width == 0;
+    uint count = params.environment_samples, by_lobe = is_even ? count : has_specular(s) ? count / 2 : 0;
     vec4 u = fract(unit_interval(random) + float(params.sample_index) * vec4(0.7548777, 0.5698403, 0.6180340, 0.3247180));
-    float density;
+    float drawn;
     vec3 direction;
-    if (env.width == 0) {
-        direction = basis_of(receiver.surface.normal) * cosine_hemisphere(u.xy);
-        density = max(dot(receiver.surface.normal, direction), 1e-6) / PI;
-    } else {
-        direction = environment_sample(env, u.xy, u.zw, density);
-    }
-    float cosine = dot(receiver.surface.normal, direction);
-    vec3 light = vec3(0.0);
-    if (cosine > 0.0 && dot(receiver.geometric, direction) > 0.0 && density > 0.0)
-        light = brdf_value(receiver.surface, receiver.to_eye, direction) * environment_radiance(env, direction) * (cosine / density * share);
-    return Arrival(light, vec3(0.0), vec3(0.0), receiver.position + 1e6 * direction, NO_SENDER);
+    if (k < by_lobe) direction = brdf_sample(s, receiver.to_eye, u.z, u.xy);
+    else direction = environment_sample(env, u.xy, u.zw, drawn);
+
+    Arrival arrival = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), receiver.position + 1e6 * direction, NO_SENDER);
+    float cosine = dot(s.normal, direction);
+    if (cosine <= 0.0 || dot(receiver.geometric, direction) <= 0.0) return arrival;
+    float density = float(by_lobe) * brdf_density(s, receiver.to_eye, direction);
+    if (!is_even) density += float(count - by_lobe) * environment_density(env, direction);
+    if (density > 0.0)
+        arrival.direct = brdf_value(s, receiver.to_eye, direction) * environment_radiance(env, direction) * (cosine / density);
+    return arrival;
 }
 
 vec3 direct_sum, indirect_sum, lost_sum;     // W m^-2 sr^-1
@@ -144,7 +148,8 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
             }
         }
         while (!found && environment_taken < params.environment_samples) {
-            arrival = environment_arrival(pcg4d(uvec4(index, environment_taken++, 1u, params.seed)), 1.0 / float(params.environment_samples));
+            arrival = environment_arrival(environment_taken, pcg4d(uvec4(index, environment_taken, 1u, params.seed)));
+            ++environment_taken;
             found = arrival.direct != vec3(0.0);
         }
         if (!found) break;

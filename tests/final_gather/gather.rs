@@ -268,3 +268,22 @@ fn an_even_sky_gives_its_radiance_times_the_albedo() {
         assert!(error < 1e-4, "{direct}");
     }
 }
+
+/// Polished metal under an even sky reflects nearly all of it, at every pixel: directions follow the lobe.
+#[test]
+fn metal_under_an_even_sky_has_no_sparkles() {
+    let context = TestContext::new();
+    let floor = parallelogram(Vec3::new(-9.0, 0.0, 9.0), Vec3::X * 18.0, Vec3::NEG_Z * 18.0, 2, 0);
+    let metal = Material { metallic: 1.0, roughness: 0.3, ..one_sided(1.0) };
+    let scene = scene(vec![metal], vec![floor], &[]);
+    let view = view(Vec3::new(0.0, 2.0, 1.5), Vec3::ZERO, 0.3);
+    let fixture = Fixture::new(&context, &scene, &Environment::Constant(Vec3::ONE), false, view);
+    let dark = vec![Vec3::ZERO; fixture.leaves.len()];
+    let settings = Settings { environment_samples: 4, ..ALL_SEEN };
+    let gather = fixture.gather(&context, settings, &dark, &dark, 1);
+    let mean = gather.direct.iter().map(|v| v.x).sum::<f32>() / gather.direct.len() as f32;
+    let most = gather.direct.iter().map(|v| v.x).fold(0.0, f32::max);
+    println!("{mean} in the mean, {most} at most");
+    // A tenth of the directions is drawn as if the surface were matt, and brings little.
+    assert!((0.9..1.0).contains(&mean) && most < 1.1, "{mean} {most}");
+}
