@@ -17,14 +17,16 @@ const ANIMATION_STEP: f32 = 1.0 / 30.0;
 impl Viewer {
     pub(super) fn keys(&mut self, ui: &Ui, desk: &Desk, step: f32) {
         // With the modifiers of the moment it was pressed: all may be released again within one slow frame.
-        let pressed_with = |wanted: Key, with_command: bool| {
+        let pressed_with = |wanted: Key, with_command: bool, repeats: bool| {
             let is_it = |event: &egui::Event| {
-                matches!(event, egui::Event::Key { key, pressed: true, modifiers, .. }
-                    if *key == wanted && modifiers.command == with_command)
+                matches!(event, egui::Event::Key { key, pressed: true, modifiers, repeat, .. }
+                    if *key == wanted && modifiers.command == with_command && (repeats || !*repeat))
             };
             ui.ctx().input(|input| input.events.iter().any(is_it))
         };
-        let pressed = |key| pressed_with(key, false);
+        // A key that is held down for long switches once, and steps on and on.
+        let pressed = |key| pressed_with(key, false, false);
+        let stepped = |key| pressed_with(key, false, true);
         let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
         if pressed(Key::F1) {
             self.is_bare = !self.is_bare;
@@ -51,8 +53,8 @@ impl Viewer {
         if pressed(Key::Space) {
             self.is_playing = !self.is_playing && duration > 0.0;
         }
-        self.wants_to_quit |= pressed_with(Key::Q, true);
-        self.wants_new_surface |= pressed_with(Key::L, true);
+        self.wants_to_quit |= pressed_with(Key::Q, true, false);
+        self.wants_new_surface |= pressed_with(Key::L, true, false);
         for (key, other) in [(Key::PageDown, 1), (Key::PageUp, METHODS.len() - 1)] {
             if pressed(key) {
                 let at = METHODS.iter().position(|method| method.key == self.args.method.key).unwrap_or(0);
@@ -60,7 +62,7 @@ impl Viewer {
             }
         }
         for (key, seconds) in [(Key::Comma, -ANIMATION_STEP), (Key::Period, ANIMATION_STEP)] {
-            if pressed(key) {
+            if stepped(key) {
                 self.step_animation(seconds, duration);
             }
         }
