@@ -22,13 +22,16 @@ impl Viewer {
                 matches!(event, egui::Event::Key { key, pressed: true, modifiers, repeat, .. }
                     if *key == wanted && modifiers.command == with_command && (repeats || !*repeat))
             };
-            ui.ctx().input(|input| input.events.iter().any(is_it))
+            // How often: in one slow frame a key may come twice.
+            ui.ctx().input(|input| input.events.iter().filter(|event| is_it(event)).count())
         };
         // A key that is held down for long switches once, and steps on and on.
-        let pressed = |key| pressed_with(key, false, false);
-        let stepped = |key| pressed_with(key, false, true);
+        let presses = |key| pressed_with(key, false, false);
+        let pressed = |key| presses(key) > 0;
+        let switched = |key| presses(key) % 2 == 1;
+        let steps = |key| pressed_with(key, false, true);
         let duration = self.shown.as_ref().map_or(0.0, |shown| shown.duration);
-        if pressed(Key::F1) {
+        if switched(Key::F1) {
             self.is_bare = !self.is_bare;
         }
         if pressed(Key::F12) {
@@ -40,33 +43,33 @@ impl Viewer {
         if pressed(Key::R) {
             self.ask_again();
         }
-        if pressed(Key::P) {
+        if switched(Key::P) {
             self.toggle_profile(desk);
         }
-        if pressed(Key::X) {
+        if switched(Key::X) {
             self.explains = !self.explains;
         }
         if pressed(Key::Escape) {
             desk.cancel();
             self.explanation = None;
         }
-        if pressed(Key::Space) {
+        if switched(Key::Space) {
             self.is_playing = !self.is_playing && duration > 0.0;
         }
-        self.wants_to_quit |= pressed_with(Key::Q, true, false);
-        self.wants_new_surface |= pressed_with(Key::L, true, false);
+        self.wants_to_quit |= pressed_with(Key::Q, true, false) > 0;
+        self.wants_new_surface |= pressed_with(Key::L, true, false) > 0;
         for (key, other) in [(Key::PageDown, 1), (Key::PageUp, METHODS.len() - 1)] {
-            if pressed(key) {
+            for _ in 0..presses(key) {
                 let at = METHODS.iter().position(|method| method.key == self.args.method.key).unwrap_or(0);
                 self.choose_method(&METHODS[(at + other) % METHODS.len()]);
             }
         }
         for (key, seconds) in [(Key::Comma, -ANIMATION_STEP), (Key::Period, ANIMATION_STEP)] {
-            if stepped(key) {
+            for _ in 0..steps(key) {
                 self.step_animation(seconds, duration);
             }
         }
-        if pressed(Key::C) {
+        if switched(Key::C) {
             self.camera_mode = match self.camera_mode {
                 CameraMode::Orbit => CameraMode::Fly,
                 CameraMode::Fly => CameraMode::Orbit,
