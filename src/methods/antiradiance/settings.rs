@@ -65,7 +65,7 @@ crate::settings! {
         /// How far below zero the light of a bin may fall, of what the bin, and its side on average, received unoccluded:
         /// keeps the iteration from growing where many surfaces stand one behind the other. 0 also cuts noise, and leaks; 1e9
         /// never cuts, but for the steps of the asymmetric scheme that follow the first of a bounce.
-        undershoot: f32 = 0.25, range 0.0..=1e9, paper "no limit";
+        undershoot: f32 = 0.1, range 0.0..=1e9, paper "no limit";
         /// Which surfaces take away light that meets their backs.
         backs: Backs = Backs::Open, paper "none: solids only";
         /// Leaves whose specular lobe reflects at least this much at normal incidence reflect it bin by bin; others reflect
