@@ -91,8 +91,10 @@ fn what_gfxreconstruct_captured_replays_to_the_same_picture() {
     };
     let files = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path());
     let frames: Vec<PathBuf> = files.filter(|path| number(path).is_some()).collect();
-    let last = frames.iter().max_by_key(|path| number(path)).unwrap_or_else(|| panic!("no frame: {said}"));
-    assert!(bitmap(last) == rgb(&shot.with_extension("png")), "{} of {}", last.display(), frames.len());
+    assert!(!frames.is_empty(), "no frame: {said}");
+    let picture = rgb(&shot.with_extension("png"));
+    // The window goes on drawing while it is closed.
+    assert!(frames.iter().any(|frame| bitmap(frame) == picture), "none of {} frames is the picture", frames.len());
     let first = frames.iter().min_by_key(|path| number(path)).unwrap();
-    assert!(bitmap(first) != bitmap(last), "frames differ: the first shows no picture yet");
+    assert!(bitmap(first) != picture, "frames differ: the first shows no picture yet");
 }
