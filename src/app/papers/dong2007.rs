@@ -124,7 +124,8 @@ fn pictures() -> [Row; 6] {
             "Fig. 2",
             ("a deforming model", "all elements and links are made anew in each frame"),
             "flying dragon",
-            &["0", "1", "2"].map(|time| (time, shown("dancer", &format!("--bounces 1 --seconds {time}")))),
+            &[("0 s", 0), ("1 s", 1), ("2 s", 2)]
+                .map(|(caption, time)| (caption, shown("dancer", &format!("--bounces 1 --seconds {time}")))),
         )
         .slow(),
         Row::views(
@@ -139,7 +140,8 @@ fn pictures() -> [Row; 6] {
             "Fig. 8",
             ("light with no, one and two bounces", "one-bounce lighting is sufficient for a pleasing result"),
             "monster on a plane",
-            &["0", "1", "2"].map(|bounces| (bounces, shown("cornell-box", &format!("--diffuse --bounces {bounces}")))),
+            &[("no bounce", 0), ("one bounce", 1), ("two bounces", 2)]
+                .map(|(caption, bounces)| (caption, shown("cornell-box", &format!("--diffuse --bounces {bounces}")))),
         ),
         Row::pictures(
             METHOD,
