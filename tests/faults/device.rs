@@ -31,7 +31,14 @@ fn work() -> Result<Vec<u32>, GpuError> {
     let mut result = context.download(&values)?;
     result.extend(context.download_image::<u32>(&image, 1)?);
     let sampler = context.sampler("test/sampler", SamplerDescription::NEAREST_CLAMP)?;
-    drop(context.texture_table(vec![image], vec![sampler], &[(0, 0)])?);
+    let texture = ImageDescription {
+        name: "test/texture",
+        layers: 1,
+        format: Format::Rgba32Float,
+        shape: Shape::Flat,
+        ..description
+    };
+    drop(context.texture_table(vec![context.image(&texture)?], vec![sampler], &[(0, 0)])?);
     if context.features().ray_query {
         let positions = context.upload("test/positions", &[Vec3::ZERO, Vec3::X, Vec3::Y])?;
         let triangles = context.upload("test/triangles", &[UVec3::new(0, 1, 2)])?;

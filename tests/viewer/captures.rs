@@ -93,8 +93,13 @@ fn what_gfxreconstruct_captured_replays_to_the_same_picture() {
     let frames: Vec<PathBuf> = files.filter(|path| number(path).is_some()).collect();
     assert!(!frames.is_empty(), "no frame: {said}");
     let picture = rgb(&shot.with_extension("png"));
+    // The driver rounds the window's bytes, we those of the file: one may be a step apart.
+    let is_picture = |path: &PathBuf| {
+        let frame = bitmap(path);
+        frame.dimensions() == picture.dimensions() && frame.iter().zip(picture.iter()).all(|(a, b)| a.abs_diff(*b) <= 1)
+    };
     // The window goes on drawing while it is closed.
-    assert!(frames.iter().any(|frame| bitmap(frame) == picture), "none of {} frames is the picture", frames.len());
+    assert!(frames.iter().any(is_picture), "none of {} frames is the picture", frames.len());
     let first = frames.iter().min_by_key(|path| number(path)).unwrap();
-    assert!(bitmap(first) != picture, "frames differ: the first shows no picture yet");
+    assert!(!is_picture(first), "frames differ: the first shows no picture yet");
 }
