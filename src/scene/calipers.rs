@@ -1,6 +1,5 @@
 //! The smallest rectangle around points of the plane: rotating callipers on their convex hull.   [Toussaint1983]
 //!
-//! [Andrew1979]: crate::methods::PAPERS
 //! [Toussaint1983]: crate::methods::PAPERS
 
 use glam::Vec2;
@@ -26,7 +25,9 @@ pub fn direction(points: &mut Vec<Vec2>) -> Vec2 {
     best.1
 }
 
-/// Corners of the convex hull, counter-clockwise: the monotone chain.                              [Andrew1979]
+/// Corners of the convex hull, counter-clockwise: the monotone chain. [Andrew1979]
+///
+/// [Andrew1979]: crate::methods::PAPERS
 pub fn convex_hull(points: &mut Vec<Vec2>) -> Vec<Vec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     points.dedup();
