@@ -3,10 +3,10 @@
 #include "lib/pair_queue.glsl"
 
 // One thread: how many pairs the next step takes from the top of the stack, so that all they can be refined into has room.
-// updates counters[1]   writes groups[3] (of 64 threads, for the take and the step)   shared none
+// updates counters[1]   writes thread_counts[1] (of the take and the step)   shared none
 layout(local_size_x = 1) in;
 layout(set = 0, binding = 0, scalar) buffer Counters { PairCounters counters[]; };
-layout(set = 0, binding = 1, scalar) writeonly buffer Groups { uint groups[]; };
+layout(set = 0, binding = 1, scalar) writeonly buffer ThreadCounts { uint thread_counts[]; };
 layout(push_constant, scalar) uniform Params {
     uint batch;             // pairs of a step, at most
     uint capacity;          // pairs of the stack
@@ -28,7 +28,5 @@ void main()
     counters[0].visited += taken;
     counters[0].highest = max(counters[0].highest, top);
     if (taken == 0 && top > 0) counters[0].is_full = 1;
-    groups[0] = (taken + 63) / 64;
-    groups[1] = 1;
-    groups[2] = 1;
+    thread_counts[0] = taken;
 }

@@ -1,5 +1,6 @@
 //! The recorder: every pass is labelled, timed, counted and synchronised here, in one place, always.
 
+use super::RawBuffer;
 use super::context::Context;
 use super::descriptors::push_descriptors;
 use super::error::{Checked, GpuError};
@@ -10,7 +11,6 @@ use super::pipelines::{Bound, RasterState, stage_flags};
 use super::profiler::Cost;
 use super::staging::Way;
 use super::target::{Target, attachment};
-use super::{Buffer, RawBuffer};
 use ash::vk;
 use std::cell::Cell;
 use std::fmt::Display;
@@ -175,22 +175,6 @@ impl<'c> Recorder<'c> {
         });
     }
 
-    /// Runs a compute pass over the workgroup counts (x, y, z) that an earlier pass left at `groups[index..index + 3]`.
-    pub fn dispatch_indirect<P: Pass>(&mut self, pass: &P, groups: &Buffer<u32>, index: usize) {
-        let mut bindings = Bindings::default();
-        pass.bind(&mut bindings);
-        if index.checked_add(3).is_none_or(|end| end > groups.len()) {
-            let message = format!("{}: indirect group counts at {index} of {}", P::PROGRAM.name, groups.len());
-            return self.fail(GpuError::Refused(message));
-        }
-        let access = Access { id: groups.id(), reads: true, writes: false };
-        let raw = groups.raw();
-        self.compute(P::PROGRAM, &bindings, &[access], None, 0, |device, commands| {
-            // SAFETY: the three counts lie inside the buffer, which allows indirect use.
-            unsafe { device.raw.cmd_dispatch_indirect(commands, raw, 4 * index as u64) }
-        });
-    }
-
     /// Draws `vertices` x `instances` into `target`; vertex shaders pull their data from buffers.
     pub fn draw<P: Pass>(&mut self, pass: &P, target: &Target<'_>, state: RasterState, vertices: u32, instances: u32) {
         let mut bindings = Bindings::default();
@@ -275,7 +259,7 @@ impl<'c> Recorder<'c> {
     }
 
     /// Binds a compute pipeline and records `command`.
-    fn compute(
+    pub(super) fn compute(
         &mut self,
         program: &'static Program,
         bindings: &Bindings<'_>,

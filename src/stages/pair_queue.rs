@@ -8,7 +8,7 @@
 
 use crate::gpu::shaders::pair_queue as passes;
 use crate::gpu::shaders::types::PairCounters;
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, GroupCounts, Recorder};
 use glam::UVec2;
 
 /// Steps recorded before the host looks whether all is done. A step over nothing costs microseconds.
@@ -63,8 +63,10 @@ pub struct PairQueue {
     pub taken: Buffer<UVec2>,
     /// One entry.
     pub counters: Buffer<PairCounters>,
-    /// Workgroups of 64 threads of the present step, for [`Recorder::dispatch_indirect`] at 0.
-    pub groups: Buffer<u32>,
+    /// Threads of the present step: one a pair.
+    thread_count: Buffer<u32>,
+    /// Their workgroups, of 64 threads, for [`Recorder::dispatch_indirect`].
+    pub groups: GroupCounts,
 }
 
 impl PairQueue {
@@ -73,7 +75,8 @@ impl PairQueue {
             stack: context.buffer(&format!("{owner}/pair stack"), plan.capacity() as usize)?,
             taken: context.buffer(&format!("{owner}/taken pairs"), plan.batch as usize)?,
             counters: context.buffer(&format!("{owner}/pair counters"), 1)?,
-            groups: context.buffer(&format!("{owner}/pair groups"), 3)?,
+            thread_count: context.buffer(&format!("{owner}/pair threads"), 1)?,
+            groups: context.group_counts(&format!("{owner}/pair groups"), 64)?,
             plan,
         })
     }
@@ -145,8 +148,10 @@ impl PairQueue {
     fn take(&self, recorder: &mut Recorder<'_>) {
         let PairQueuePlan { batch, max_children, .. } = self.plan;
         let params = passes::ChooseParams { batch, capacity: self.plan.capacity(), max_children };
-        recorder.dispatch(&passes::Choose { counters: &self.counters, groups: &self.groups, params }, 1u32);
+        let choose = passes::Choose { counters: &self.counters, thread_counts: &self.thread_count, params };
+        recorder.dispatch(&choose, 1u32);
+        recorder.count_groups(&self.groups, &self.thread_count, 0);
         let take = passes::Take { counters: &self.counters, pair_stack: &self.stack, taken_pairs: &self.taken };
-        recorder.dispatch_indirect(&take, &self.groups, 0);
+        recorder.dispatch_indirect(&take, &self.groups);
     }
 }

@@ -71,7 +71,9 @@ fn objects_of_another_device_are_refused() {
         recorder.submit()
     };
     refused(recorded(&|r| r.dispatch(&add(&values, &foreign, 64), 64u32)), &["scan/add_block_sums", "another device"]);
-    refused(recorded(&|r| r.dispatch_indirect(&add(&values, &values, 64), &foreign, 0)), &["another device"]);
+    let groups = other.group_counts("test/groups", 256).unwrap();
+    refused(recorded(&|r| r.dispatch_indirect(&add(&values, &values, 64), &groups)), &["another device"]);
+    refused(recorded(&|r| r.count_groups(&groups, &values, 0)), &["another device"]);
     refused(recorded(&|r| r.copy(&foreign, &values)), &["another device"]);
     refused(recorded(&|r| r.fill(&foreign, 0)), &["another device"]);
     refused(recorded(&|r| r.write(&foreign, 0, &[1u32])), &["another device"]);
@@ -108,8 +110,11 @@ fn ranges_beyond_the_end_are_refused() {
         recorder.submit()
     };
     refused(recorded(&|r| r.write(&values, usize::MAX, &[1u32; 2])), &["test/values"]);
-    refused(recorded(&|r| r.dispatch_indirect(&add(&values, &values, 64), &values, 62)), &["62 of 64"]);
-    refused(recorded(&|r| r.dispatch_indirect(&add(&values, &values, 64), &values, usize::MAX)), &["of 64"]);
+    let groups = context.group_counts("test/groups", 64).unwrap();
+    refused(recorded(&|r| r.count_groups(&groups, &values, 64)), &["64 of 64"]);
+    refused(recorded(&|r| r.count_groups(&groups, &values, usize::MAX)), &["of 64"]);
+    refused(recorded(&|r| r.dispatch_indirect(&add(&values, &values, 64), &groups)), &["[256, 1, 1]", "for 64"]);
+    assert!(context.group_counts("test/groups", 0).is_err());
     refused(recorded(&|r| r.dispatch(&add(&values, &values, 64), [u32::MAX, 1])), &["workgroups"]);
     refused(recorded(&|r| r.copy(&values, &values)), &["test/values"]);
     let (color, depth) = (image(&context, 4, Format::Rgba8), image(&context, 4, Format::Depth32));

@@ -15,28 +15,25 @@ use linklight::stages::scan;
 use linklight::stages::world::World;
 
 #[test]
-fn an_indirect_dispatch_runs_the_groups_an_earlier_pass_left() {
+fn an_indirect_dispatch_runs_as_many_threads_as_an_earlier_pass_left() {
     let context = TestContext::new();
     let values = context.upload("test/values", &[0u32; 1000]).unwrap();
     let block_sums = context.upload("test/block sums", &[7u32]).unwrap();
-    let groups = context.upload("test/groups", &[9u32, 9, 9, 0, 0, 0]).unwrap();
+    let threads = context.upload("test/threads", &[9u32, 0]).unwrap();
+    let groups = context.group_counts("test/groups", 256).unwrap();
     let pass =
         AddBlockSums { values: &values, block_sums: &block_sums, params: AddBlockSumsParams { value_count: 1000 } };
-    let mut recorder = context.recorder("test").unwrap();
-    recorder.write(&groups, 3, &[2u32, 1, 1]);
-    recorder.dispatch_indirect(&pass, &groups, 3);
-    recorder.submit().unwrap();
-    // Two workgroups of 256 threads.
-    let expected: Vec<u32> = (0..1000).map(|i| if i < 512 { 7 } else { 0 }).collect();
-    assert_eq!(context.download(&values).unwrap(), expected);
-
-    for index in [4, usize::MAX] {
+    // Two workgroups of 256 threads; none; and more than one dimension of a device holds, in rows: each value once.
+    for (count, reached) in [(257u32, 512), (512, 512), (0, 0), (70_000 * 256, 1000)] {
         let mut recorder = context.recorder("test").unwrap();
-        recorder.dispatch_indirect(&pass, &groups, index);
-        let message = recorder.submit().unwrap_err().to_string();
-        assert!(message.contains("scan/add_block_sums") && message.contains("of 6"), "{message}");
+        recorder.write(&values, 0, &[0u32; 1000]);
+        recorder.write(&threads, 1, &[count]);
+        recorder.count_groups(&groups, &threads, 1);
+        recorder.dispatch_indirect(&pass, &groups);
+        recorder.submit().unwrap();
+        let expected: Vec<u32> = (0..1000).map(|i| if i < reached { 7 } else { 0 }).collect();
+        assert_eq!(context.download(&values).unwrap(), expected, "{count} threads");
     }
-    assert_eq!(context.download(&values).unwrap(), expected, "nothing ran");
 }
 
 fn empty_world(context: &Context) -> World {

@@ -25,7 +25,7 @@ fn split(
             seen: &seen,
             params: probe::PairQueueParams { ways },
         };
-        recorder.dispatch_indirect(&pass, &queue.groups, 0);
+        recorder.dispatch_indirect(&pass, &queue.groups);
     })?;
     Ok((counters, context.download(&seen)?))
 }

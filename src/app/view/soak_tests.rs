@@ -1,8 +1,9 @@
 //! Long work with random edits: pictures stay those of a new engine, and memory stays what it was.
 //!
 //! `LINKLIGHT_SOAK_FRAMES=10000 LINKLIGHT_SOAK_SCENES=dancer,tea-room LINKLIGHT_SOAK_SEED=7 cargo test --release --lib soak
-//! -- --nocapture` is the long form; methods by LINKLIGHT_SOAK_METHODS. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks at every
-//! access of every shader (its instrumented shaders take a minute a method to compile): none reaches beyond what is bound.
+//! -- --nocapture` is the long form; methods by LINKLIGHT_SOAK_METHODS, and LINKLIGHT_SOAK_ELEMENTS=300 makes frames of methods
+//! with elements short. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks at every access of every shader (its instrumented
+//! shaders take a minute a method to compile): none reaches beyond what is bound.
 
 use std::time::Instant;
 
@@ -118,7 +119,10 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
     let gpu_assisted = variable("LINKLIGHT_SOAK_ASSISTED").is_some();
     let context = Context::new(Options { validation: true, gpu_assisted, ..Options::default() }).unwrap();
     let settings = SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings);
-    let asked = |state: &State| format!("builtin:{scene} --method {method} {settings} {}", state.options());
+    let elements = variable("LINKLIGHT_SOAK_ELEMENTS")
+        .filter(|_| !["path-tracing", "surface-shadow-maps", "face-cluster"].contains(&method))
+        .map_or(String::new(), |count| format!("--elements {count}"));
+    let asked = |state: &State| format!("builtin:{scene} --method {method} {elements} {settings} {}", state.options());
     let mut engine = Engine::new(&context);
     let (mut state, mut random) = (State { bounces: 1, ..State::default() }, Random(seed));
     let first_state = state.clone();

@@ -84,7 +84,7 @@ impl NodeLinks {
                     links: &pairs,
                     params: passes::RefineLinksParams { solid_angle, capacity: capacity as u32 },
                 };
-                recorder.dispatch_indirect(&pass, &queue.groups, 0);
+                recorder.dispatch_indirect(&pass, &queue.groups);
             })?;
             let needed = u64::from(counters.accepted);
             if needed <= capacity {

@@ -118,7 +118,7 @@ impl FaceClusters {
             pair_stack: &queue.stack,
             pool: &s.pool,
         };
-        recorder.dispatch_indirect(&expand, &queue.groups, 0);
+        recorder.dispatch_indirect(&expand, &queue.groups);
     }
 
     /// Transports the pairs of a step, or decides how to split them.                       [Gobbetti2003 3.3]
@@ -170,7 +170,7 @@ impl FaceClusters {
                 clusters_block,
             };
             let params = passes::TransportLightsParams { threshold, bent_light, units, far, ray_offset };
-            recorder.dispatch_indirect(&deciding!(TransportLights, lights, params, constants), &queue.groups, 0);
+            recorder.dispatch_indirect(&deciding!(TransportLights, lights, params, constants), &queue.groups);
         } else {
             let constants = passes::TransportConstants {
                 receiver_nodes,
@@ -182,7 +182,7 @@ impl FaceClusters {
             };
             let params =
                 passes::TransportParams { threshold, bent_light, units, rays_per_node: self.settings.rays_per_node };
-            recorder.dispatch_indirect(&deciding!(Transport, unshot: &s.unshot, params, constants), &queue.groups, 0);
+            recorder.dispatch_indirect(&deciding!(Transport, unshot: &s.unshot, params, constants), &queue.groups);
         }
     }
 
@@ -199,7 +199,7 @@ impl FaceClusters {
             pool: &s.pool,
             params: passes::GrowParams { capacity },
         };
-        recorder.dispatch_indirect(&claim, &queue.groups, 0);
+        recorder.dispatch_indirect(&claim, &queue.groups);
         let make = passes::MakeChildren {
             clusters: &p.clusters,
             cluster_skips: &p.skips,
@@ -215,7 +215,7 @@ impl FaceClusters {
             params: passes::MakeChildrenParams { capacity },
             constants: passes::MakeChildrenConstants { rule_nodes: s.rules.len() as u32 },
         };
-        recorder.dispatch_indirect(&make, &queue.groups, 0);
+        recorder.dispatch_indirect(&make, &queue.groups);
         let inherit = passes::Inherit {
             counters: &queue.counters,
             elements: &s.elements,
@@ -231,7 +231,7 @@ impl FaceClusters {
                 radiosity_functions: self.settings.radiosity_basis.functions(),
             },
         };
-        recorder.dispatch_indirect(&inherit, &queue.groups, 0);
+        recorder.dispatch_indirect(&inherit, &queue.groups);
     }
 
     /// What the roots are about to send, W per channel.
