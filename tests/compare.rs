@@ -99,6 +99,28 @@ fn a_failed_run_does_not_end_the_others() {
     assert!(runs[1]["outcome"]["failed"].as_str().unwrap().contains("nowhere"), "{runs}");
 }
 
+/// The symmetric scheme holds a bounce for each of its steps, whatever `--bounces` says; its figures are of a reference of as many.
+#[test]
+fn a_method_that_holds_other_bounces_is_held_to_as_many() {
+    let folder = tempfile::tempdir().unwrap();
+    let symmetric = ["--method", "antiradiance", "--set", "scheme=symmetric", "--set", "bins=72", "--curve-spp", "0"];
+    let steps = ["--vary", "iterations=1,3", "--noise", "1", "--json"];
+    let data = json(&compare(folder.path(), &[&symmetric[..], &steps, &SMALL].concat()));
+    let held = |run: usize| {
+        data["scenes"][0]["runs"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|run| &run["outcome"]["done"]["bounces_held"])
+            .filter(|held| **held == run)
+            .count()
+    };
+    // One of explicit visibility, which has no such setting.
+    assert_eq!((held(1), held(3)), (0, 1), "{data}");
+    assert!(folder.path().join("perpendicular-plates/reference-3-bounces.exr").is_file());
+    assert!(std::fs::read_to_string(folder.path().join("index.html")).unwrap().contains("a reference of 3 bounces"));
+}
+
 #[test]
 fn wrong_usage_is_told_before_any_work() {
     let folder = tempfile::tempdir().unwrap();

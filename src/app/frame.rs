@@ -15,7 +15,7 @@ use crate::display::shadow_maps::ShadowMaps;
 use crate::display::splat::{self, SplatLight, SplatSums};
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::{self, Context};
-use crate::methods::antiradiance::Antiradiance;
+use crate::methods::antiradiance::{self, Antiradiance};
 use crate::methods::explicit_visibility::{self, ExplicitVisibility, Helper};
 use crate::methods::face_cluster::{self, FaceClusters};
 use crate::methods::implicit_visibility::ImplicitVisibility;
@@ -30,6 +30,14 @@ use serde_json::Value;
 /// Tasks that sample a picture again and again, and may be left at any sample for a newer one.
 pub const SAMPLING_TASKS: [&str; 2] = ["path-tracing", GATHER_TASK];
 const GATHER_TASK: &str = "final gather";
+
+/// Indirect bounces that the picture of a request holds: a reference of fewer or more shows something else.
+pub fn bounces_held(request: &RenderRequest) -> Result<u32, AppError> {
+    match request.method.key {
+        "antiradiance" => Ok(request.settings::<antiradiance::Settings>()?.bounces_held(request.bounces)),
+        _ => Ok(request.bounces),
+    }
+}
 
 /// The method of a request, prepared for its scene: what stays from frame to frame.
 pub enum Method {

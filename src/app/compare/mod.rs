@@ -13,7 +13,7 @@ use super::console::{Console, Watcher};
 use super::diff::{complaint, is_above, number};
 use super::interrupt::Interrupt;
 use super::values::SceneSource;
-use super::{measure, render};
+use super::{frame, measure, render};
 use crate::methods::{self, METHODS, Method};
 use crate::report::compare_page::{
     CurvePoint, Done, MethodReport, Outcome, ReferenceReport, Report, RunReport, SCHEMA, SceneReport, VERSION, to_html,
@@ -164,18 +164,20 @@ impl Session<'_> {
         self.write(report)?;
         for run in runs {
             let Some(scene) = report.scenes.last_mut() else { return Ok(()) };
-            let outcome = match self.watch.attempt(self.run(&run, &reference, &scene.reference.bounce_means))? {
-                Ok(done) => {
-                    let failed = self.args.fail_above.iter().filter(|limit| is_above(limit, &done.figures));
-                    complaints
-                        .extend(failed.map(|limit| format!("`{}`: {}", run.command, complaint(limit, &done.figures))));
-                    Outcome::Done(Box::new(done))
-                }
-                Err(reason) => {
-                    complaints.push(format!("`{}` failed: {reason}", run.command));
-                    Outcome::Failed(reason)
-                }
-            };
+            let outcome =
+                match self.watch.attempt(self.run(&run, (reference_run, &reference), &scene.reference.bounce_means))? {
+                    Ok(done) => {
+                        let failed = self.args.fail_above.iter().filter(|limit| is_above(limit, &done.figures));
+                        complaints.extend(
+                            failed.map(|limit| format!("`{}`: {}", run.command, complaint(limit, &done.figures))),
+                        );
+                        Outcome::Done(Box::new(done))
+                    }
+                    Err(reason) => {
+                        complaints.push(format!("`{}` failed: {reason}", run.command));
+                        Outcome::Failed(reason)
+                    }
+                };
             let method = run.request.method.key;
             scene.runs.push(RunReport { method, variation: run.variation, command: run.command, outcome });
             self.write(report)?;
@@ -221,9 +223,28 @@ impl Session<'_> {
         measured::path_tracing_curve(run, &reference.picture, samples, tone, &self.watch)
     }
 
-    fn run(&self, run: &Run, reference: &Reference, reference_means: &[f64]) -> Result<Done, AppError> {
-        let measured = measured::measure(run, self.args.frames, true, &self.watch)?;
-        let comparison = compare(&measured.picture, &reference.picture, None, &self.tone)?;
+    /// The reference of as many bounces as `run`'s picture holds, where that is not what was asked for.
+    fn own_reference(&self, run: &Run, reference_run: &Run) -> Result<Option<(Reference, u32)>, AppError> {
+        let bounces = frame::bounces_held(&run.request)?;
+        if self.args.reference.is_some() || bounces == reference_run.request.bounces {
+            return Ok(None);
+        }
+        let mut own = reference_run.clone();
+        own.request.bounces = bounces;
+        own.request.output.path.set_file_name(format!("reference-{bounces}-bounces.exr"));
+        Ok(Some((self.reference(&own)?, bounces)))
+    }
+
+    fn run(
+        &self,
+        run: &Run,
+        (reference_run, reference): (&Run, &Reference),
+        reference_means: &[f64],
+    ) -> Result<Done, AppError> {
+        let own = self.own_reference(run, reference_run)?;
+        let measured = measured::measure(run, self.args.frames, own.is_none(), &self.watch)?;
+        let held_to = own.as_ref().map_or(reference, |(own, _)| own);
+        let comparison = compare(&measured.picture, &held_to.picture, None, &self.tone)?;
         let exr = &run.request.output.path;
         image::write_exr(exr, &measured.picture)?;
         let Picture { width, height, rgb, .. } = &measured.picture;
@@ -238,7 +259,12 @@ impl Session<'_> {
             relative: write("relative.png", &heat_map::to_bytes(&comparison.relative_map))?,
             exr: self.beside(exr),
             figures: comparison.figures,
-            bounce_energy: bounce_energy(&measured.bounce_means, reference_means),
+            bounce_energy: if own.is_none() {
+                bounce_energy(&measured.bounce_means, reference_means)
+            } else {
+                Vec::new()
+            },
+            bounces_held: own.map(|(_, bounces)| bounces),
             cost: measured.cost,
         })
     }
@@ -285,7 +311,13 @@ fn print_table(report: &Report, out: &mut dyn Write) -> Result<(), AppError> {
                 }
                 Outcome::Failed(reason) => write!(out, "failed: {reason}")?,
             }
-            writeln!(out, "  {}", run.variation)?;
+            write!(out, "  {}", run.variation)?;
+            if let Outcome::Done(done) = &run.outcome
+                && let Some(bounces) = done.bounces_held
+            {
+                write!(out, " (against {bounces} bounces, as many as it holds)")?;
+            }
+            writeln!(out)?;
         }
     }
     Ok(())

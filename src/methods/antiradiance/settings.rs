@@ -38,6 +38,13 @@ crate::choice! {
     }
 }
 
+impl Settings {
+    /// Indirect bounces in the light of a solve that was asked for `bounces`: each symmetric step takes in one more.
+    pub fn bounces_held(&self, bounces: u32) -> u32 {
+        if bounces > 0 && self.scheme == Scheme::Symmetric { self.iterations } else { bounces }
+    }
+}
+
 crate::settings! {
     /// What antiradiance lets the user choose.
     pub struct Settings {

@@ -183,7 +183,10 @@ fn figure(scene: &SceneReport, run: &RunReport) -> String {
         number(cost.frame_ms.min, 1),
         number(cost.frame_ms.max, 1),
         number(cost.peak_bytes as f64 / f64::from(1 << 20), 1),
-        bounces.join(" "),
+        done.bounces_held.map_or_else(
+            || bounces.join(" "),
+            |held| format!("not told apart: held to a reference of {held} bounces, as many as it holds")
+        ),
         escaped(&done.exr),
         escaped(&run.command)
     );

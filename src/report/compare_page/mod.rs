@@ -93,8 +93,12 @@ pub struct Done {
     pub relative: String,
     pub figures: ErrorFigures,
     pub cost: Cost,
-    /// Energy of each bounce alone over the reference's; `None` where that is black or unknown.
+    /// Energy of each bounce alone over the reference's; `None` where that is black or unknown. Empty where bounces cannot be
+    /// told apart.
     pub bounce_energy: Vec<Option<f64>>,
+    /// Bounces of the reference that the figures are of, where the method holds another number of them than was asked for:
+    /// antiradiance's symmetric scheme takes one bounce on with each step.
+    pub bounces_held: Option<u32>,
 }
 
 /// What a picture cost.
