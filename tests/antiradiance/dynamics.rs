@@ -5,7 +5,8 @@ use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{prepare, relative_rmse, settings, solve};
 use glam::Vec3;
-use linklight::methods::antiradiance::Settings;
+use linklight::methods::antiradiance::{Antiradiance, Leaves, Settings};
+use linklight::methods::carried::Sender;
 use linklight::scene::environment::Environment;
 use linklight::scene::pose::Pose;
 use linklight::scene::{LightKind, Scene, Transform};
@@ -38,11 +39,43 @@ fn with_plate(height: f32) -> Scene {
 
 #[test]
 fn what_moved_is_followed_with_new_links_and_with_standing_ones() {
+    is_followed(Leaves::Vertices);
+}
+
+#[test]
+fn what_moved_is_followed_by_patches() {
+    is_followed(Leaves::Patches);
+}
+
+/// What `carried_to` tells of elements adds up to their light, and without a floor links alone brought it.
+fn links_carried_it(context: &TestContext, method: &Antiradiance, indirect: &[Vec3]) {
+    let elements: Vec<u32> = (0..indirect.len() as u32).step_by(7).collect();
+    let carried = method.carried_to(context, &elements).unwrap();
+    let brightest = indirect.iter().map(|e| e.max_element()).fold(0.0, f32::max);
+    let mut senders = 0;
+    for (&element, carried) in elements.iter().zip(&carried) {
+        let sum: Vec3 = carried.iter().map(|own| own.irradiance).sum();
+        let found = indirect[element as usize];
+        assert!((sum - found).abs().max_element() < 1e-4 * brightest, "element {element}: {sum} for {found}");
+        let floor = carried.iter().find(|own| own.from == Sender::Floor).map_or(Vec3::ZERO, |own| own.irradiance);
+        assert!(
+            floor.abs().max_element() < 1e-4 * brightest || found.min_element() <= 0.0,
+            "element {element}: {floor}"
+        );
+        senders += carried.len();
+    }
+    assert!(senders > 10 * elements.len(), "{senders}");
+}
+
+fn is_followed(leaves: Leaves) {
     let context = TestContext::new();
-    let settings = Settings { refinement: 2.0, ..settings(128) };
+    // Without a floor: what links carry is all there is.
+    let settings = Settings { refinement: 2.0, leaves, patch_side: 0.1, undershoot: 1e9, ..settings(128) };
     let mut fixture = Fixture::new(&context, with_plate(0.4), None);
     let mut method = prepare(&context, &fixture, settings);
+    method.keep_sent(&context, true).unwrap();
     let before = solve(&context, &mut method, &fixture, 2).indirect;
+    links_carried_it(&context, &method, &before);
 
     let moved = Fixture::new(&context, with_plate(0.7), None);
     let mut fresh = prepare(&context, &moved, settings);
@@ -57,10 +90,16 @@ fn what_moved_is_followed_with_new_links_and_with_standing_ones() {
     let stage = fixture.stage();
     method.follow(&context, &stage, true).unwrap();
     let standing = solve(&context, &mut method, &fixture, 2).indirect;
+    links_carried_it(&context, &method, &standing);
     method.follow(&context, &fixture.stage(), false).unwrap();
     let rebuilt = solve(&context, &mut method, &fixture, 2).indirect;
     let errors = [&standing, &rebuilt].map(|light| relative_rmse(light, &expected));
-    println!("after a move: standing links differ by {:.2e}, new ones by {:.2e}", errors[0], errors[1]);
+    println!(
+        "{} leaves after a move: standing links differ by {:.2e}, new ones by {:.2e}",
+        method.report().leaves,
+        errors[0],
+        errors[1]
+    );
     // Standing links are refined for where things were; new ones differ by the shape of the tree alone.
     assert!(errors[0] < 0.05, "{}", errors[0]);
     assert!(errors[1] < 0.01, "{}", errors[1]);
