@@ -84,7 +84,7 @@ fn device_ms(records: &[PassRecord], names: &[&str]) -> f64 {
     own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
 }
 
-const LINK_PASSES: [&str; 13] = [
+const LINK_PASSES: [&str; 14] = [
     "choose",
     "take",
     "refine_links",
@@ -95,6 +95,7 @@ const LINK_PASSES: [&str; 13] = [
     "scan_blocks",
     "add_block_sums",
     "place_cells",
+    "place_transfers",
     "fill_transfers",
     "sort_transfers",
     "cosine_norms",

@@ -23,6 +23,19 @@ uint bin_of(vec3 w, uint side)
     return ((w.z < 0.0 ? side : 0u) + cell.y) * side + cell.x;
 }
 
+// A bin's direction as it is stored: x and y, two floats in a word that one load brings; the first half of the bins looks up
+// (+z). The kernel binds uint64_t bin_directions[bin_count].
+vec3 stored_direction(uint64_t xy, bool is_upper)
+{
+    vec2 p = uintBitsToFloat(unpackUint2x32(xy));
+    float z = sqrt(max(1.0 - dot(p, p), 0.0));
+    return vec3(p, is_upper ? z : -z);
+}
+#define BIN_DIRECTION(bin, bin_count) stored_direction(bin_directions[bin], (bin) < (bin_count) / 2)
+
+// The bin of the reversed directions.
+uint opposite_bin(uint bin, uint bin_count) { return bin_count - 1 - bin; }
+
 // |cosine| that stands for a whole bin at an element: never less than the mean over a bin that its plane cuts in two.
 // `norm` makes the sum of cosine times bin solid angle over either side pi.
 float discrete_cosine(float cosine, float norm, uint bin_count)

@@ -42,12 +42,18 @@ impl DirectionBins {
     /// `octant_side` is k.
     pub fn new(octant_side: u32) -> Self {
         let side = 2 * octant_side;
-        let directions = (0..2 * side * side).map(|bin| {
+        let upper = (0..side * side).map(|bin| {
             let samples = (0..SUBCELLS * SUBCELLS).map(|s| Vec2::new((s % SUBCELLS) as f32, (s / SUBCELLS) as f32));
             let sum: Vec3 = samples.map(|s| direction_in(bin, side, (s + 0.5) / SUBCELLS as f32)).sum();
-            sum.normalize()
+            let p = sum.normalize().truncate();
+            // As the device makes it from x and y.
+            p.extend((1.0 - p.dot(p)).max(0.0).sqrt())
         });
-        Self { side, directions: directions.collect() }
+        let mut directions: Vec<Vec3> = upper.collect();
+        directions.extend_from_within(..);
+        directions[(side * side) as usize..].reverse();
+        directions[(side * side) as usize..].iter_mut().for_each(|w| *w = -*w);
+        Self { side, directions }
     }
 
     pub fn count(&self) -> u32 {
@@ -61,9 +67,7 @@ impl DirectionBins {
 
     /// The bin of the reversed directions.
     pub fn opposite(&self, bin: u32) -> u32 {
-        let half = self.side * self.side;
-        let cell = bin % half;
-        (half - 1 - cell) + if bin < half { half } else { 0 }
+        self.count() - 1 - bin
     }
 
     /// Bin of a unit direction, as `bin_of` of `lib/direction_bins.glsl`.
@@ -156,7 +160,8 @@ fn direction_in(bin: u32, side: u32, at: Vec2) -> Vec3 {
 /// The bins on the device.
 pub struct DeviceBins {
     pub bins: DirectionBins,
-    pub directions: Buffer<Vec3>,
+    /// Of each bin: x and y, the bits of two floats; z is what is left, up for the first half of the bins.
+    pub directions: Buffer<u64>,
     /// See [`DirectionBins::spread_lists`].
     pub spread_offsets: Buffer<u32>,
     pub spread: Buffer<SpreadEntry>,
@@ -166,8 +171,10 @@ impl DeviceBins {
     pub fn new(context: &Context, octant_side: u32, spread: Spread) -> Result<Self, GpuError> {
         let bins = DirectionBins::new(octant_side);
         let (offsets, entries) = bins.spread_lists(spread);
+        let word = |w: &Vec3| u64::from(w.x.to_bits()) | u64::from(w.y.to_bits()) << 32;
+        let words: Vec<u64> = bins.directions.iter().map(word).collect();
         Ok(Self {
-            directions: context.upload("bins/directions", &bins.directions)?,
+            directions: context.upload("bins/directions", &words)?,
             spread_offsets: context.upload("bins/spread offsets", &offsets)?,
             spread: context.upload("bins/spread", &entries)?,
             bins,
@@ -187,7 +194,8 @@ mod tests {
             for (bin, &w) in bins.directions.iter().enumerate() {
                 let bin = bin as u32;
                 assert_eq!((bins.bin_of(w), bins.bin_of(-w)), (bin, bins.opposite(bin)), "k = {k}, {w}");
-                assert!((bins.directions[bins.opposite(bin) as usize] + w).length() < 1e-5);
+                assert_eq!(bins.directions[bins.opposite(bin) as usize], -w);
+                assert!(w.is_normalized() && (w.z > 0.0) == (bin < bins.count() / 2));
             }
         }
     }

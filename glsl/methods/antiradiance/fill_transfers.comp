@@ -4,7 +4,8 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per link, both of its directions: writes what they transfer into the bins of one window.
+// One thread per link, both of its directions: writes what they transfer into the bins of one window, where count_transfers
+// had no room to keep it.
 // reads links, nodes, leaves, cosine_norms, bin_directions, spread_offsets, spread
 // updates cells[bin_count * node_count]: in, the place of each cell's first transfer; out, one beyond its last
 // writes transfers[window] (sender's entry of a table, weight), in any order within a cell   shared none
@@ -13,7 +14,7 @@ layout(set = 0, binding = 0, scalar) readonly buffer Links { uvec2 links[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer SpreadOffsets { uint spread_offsets[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Spread { SpreadEntry spread[]; };
 layout(set = 0, binding = 7, scalar) buffer Cells { uint cells[]; };
@@ -30,6 +31,8 @@ layout(push_constant, scalar) uniform Params {
 #include "methods/antiradiance/slices.glsl"
 #include "methods/antiradiance/transfers.glsl"
 
+void transfers_follow(uint count) {}
+
 void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight)
 {
     if (receiver_bin < params.first_bin || receiver_bin >= params.end_bin) return;
@@ -42,6 +45,5 @@ void main()
 {
     uint i = linear_index();
     if (i >= params.link_count) return;
-    uvec2 link = links[i];
-    for (uint direction = 0; direction < 2; ++direction) transfers_of(link[direction], link[1 - direction]);
+    transfers_of_link(links[i]);
 }

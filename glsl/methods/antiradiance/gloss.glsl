@@ -28,7 +28,7 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
 
     vec3 sum = vec3(0.0), weights = vec3(0.0);
     for (uint bin = 0; bin < BIN_COUNT; ++bin) {
-        vec3 w = bin_directions[bin];
+        vec3 w = BIN_DIRECTION(bin, BIN_COUNT);
         float cosine = dot(normal, w);
         if (cosine > 0.0) continue;
         vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);

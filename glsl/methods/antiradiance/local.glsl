@@ -1,11 +1,21 @@
 #ifndef LOCAL
 #define LOCAL
 // What the kernels of the local pass share.
-// The kernel declares WORDS and BIN_COUNT, binds incident, environment and exitant, and has params.node_count,
-// params.add_environment and params.damping.
+// The kernel declares WORDS and BIN_COUNT, binds incident, environment, peaks and exitant, and has params.leaf_count,
+// params.node_count, params.undershoot, params.add_environment and params.damping.
+// A thread works through pairs of opposite bins: along one of them light arrives at the front, along the other it leaves it.
 
 const float PI = 3.14159265358979;
+#include "methods/antiradiance/floor.glsl"
 #include "methods/antiradiance/table.glsl"
+
+// Pairs of a thread, from part * PAIRS_A_THREAD on.
+const uint PAIRS_A_THREAD = 4;
+uint pairs_end(uint part) { return min((part + 1) * PAIRS_A_THREAD, BIN_COUNT / 2); }
+
+// The bin of a pair along which light arrives at the front, by the cosine of the pair's first; and the other one.
+uint arriving_bin(uint pair, float cosine) { return cosine > 0.0 ? opposite_bin(pair, BIN_COUNT) : pair; }
+uint leaving_bin(uint pair, float cosine) { return cosine > 0.0 ? pair : opposite_bin(pair, BIN_COUNT); }
 
 // What a leaf received itself and what its ancestors did, which stands with its parent: a macro, buffers are no arguments.
 #define arriving_in(node, parent, bin) (LOAD_ENTRY(incident, entry_of(node, bin, params.node_count)) \

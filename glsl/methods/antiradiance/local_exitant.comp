@@ -4,13 +4,13 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per leaf and few bins: reflected radiance, less antiradiance, which goes on where the light came from,
+// One thread per leaf and few pairs of bins: reflected radiance, less antiradiance, which goes on where the light came from,
 // negated; but for what local_irradiance has sent.                               [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1),
 //       glossy_of_leaf[leaf_count], specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)
 // updates peaks[BIN_COUNT * leaf_count] (of the mean), exitant (of leaves; intensity per area, W m^-2 sr^-1)
-//         residual_parts[BIN_COUNT / BINS_A_THREAD * leaf_count] (W: how much the exitant light changed, how much there is)
+//         residual_parts[part_count * leaf_count] (of leaves that are not plain; W: how much the exitant light changed, how much there is)
 // shared none
 // Differs from [Dachsbacher2007]: what arrives in a bin may not fall far below zero. While antiradiance settles, each step
 // takes away too much, then too little; without a floor the difference first grows with the number of surfaces one behind
@@ -21,7 +21,7 @@ layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Environment { vec3 environment[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Radiosity { vec3 radiosity[]; };
@@ -39,11 +39,11 @@ layout(push_constant, scalar) uniform Params {
     float damping;              // share of the new exitant light; the rest stays as it was
     uint keeps_light;           // 1: what is reflected and emitted is in the table already
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
+    uint is_undamped;           // 1: plain leaves send what they reflect, see plain.glsl
 } params;
 
-#include "methods/antiradiance/floor.glsl"
 #include "methods/antiradiance/local.glsl"
-#include "methods/antiradiance/table.glsl"
+#include "methods/antiradiance/plain.glsl"
 
 // What a bin holds before anything was taken away, of its side's mean.
 void set_peak(uint at, vec3 arriving, vec3 mean)
@@ -56,35 +56,48 @@ void main()
 {
     uint leaf = gl_GlobalInvocationID.x, part = gl_WorkGroupID.y;
     if (leaf >= params.leaf_count) return;
-    HierarchyLeaf own = leaves[leaf];
-    uint parent = nodes[own.node].parent, glossy = glossy_of_leaf[leaf];
-    bool blocks_behind = (own.flags & BLOCKS_BEHIND) != 0;
-    float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
-    vec3 l_front = radiosity[2 * leaf] / PI, l_back = radiosity[2 * leaf + 1] / PI, mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
-
-    bool was_sent = params.sets_floor == 0 && (own.flags & REFLECTS_BEHIND) == 0;
-
-    vec2 residual = vec2(0.0);      // change, sum
-    for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
-        float cosine = dot(own.normal, bin_directions[bin]);
-        bool leaves_front = cosine > 0.0;
-        if (was_sent && !leaves_front) continue;
-        vec3 radiance = leaves_front ? l_front : l_back;
-        if (glossy != NONE) radiance += specular[glossy * BIN_COUNT + bin];
-        float held = discrete_cosine(cosine, norm, BIN_COUNT);
-        if (params.keeps_light != 0 && leaves_front && !blocks_behind) {
-            vec3 size = abs(held * radiance);
-            residual.y += size.r + size.g + size.b;
-            continue;
+    uint flags = leaves[leaf].flags, glossy = glossy_of_leaf[leaf];
+    bool plain = is_plain(flags, glossy);
+    if (plain && params.keeps_light != 0) return;
+    uint node = leaves[leaf].node;
+    vec3 normal = leaves[leaf].normal, l_front = radiosity[2 * leaf] / PI;
+    float norm = cosine_norms[leaf];
+    if (plain) {
+        for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
+            float cosine = dot(normal, BIN_DIRECTION(pair, BIN_COUNT));
+            uint entry = entry_of(node, leaving_bin(pair, cosine), params.node_count);
+            STORE_ENTRY(exitant, entry, discrete_cosine(cosine, norm, BIN_COUNT) * l_front);
         }
-        if (!leaves_front || blocks_behind) {
-            vec3 arriving = arriving_in(own.node, parent, bin), mean = leaves_front ? mean_back : mean_front;
-            uint at = bin * params.leaf_count + leaf;
-            if (params.sets_floor != 0) set_peak(at, arriving, mean);
-            else arriving = max(arriving, lowest_of(peaks[at], mean, params.undershoot));
-            radiance -= arriving;
-        }
-        SEND(entry_of(own.node, bin, params.node_count), held * radiance, residual)
+        return;
     }
-    residual_parts[part * params.leaf_count + leaf] += own.area * bin_solid_angle * residual;
+
+    uint parent = nodes[node].parent;
+    bool blocks_behind = (flags & BLOCKS_BEHIND) != 0;
+    vec3 l_back = radiosity[2 * leaf + 1] / PI, mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
+    // What leaves the front, and the back too where local_irradiance has not sent it.
+    uint sides = params.sets_floor == 0 && (flags & REFLECTS_BEHIND) == 0 ? 1 : 2;
+    vec2 residual = vec2(0.0);      // change, sum
+    for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
+        float cosine = dot(normal, BIN_DIRECTION(pair, BIN_COUNT)), held = discrete_cosine(cosine, norm, BIN_COUNT);
+        for (uint side = 0; side < sides; ++side) {
+            bool leaves_front = side == 0;
+            uint bin = leaves_front ? leaving_bin(pair, cosine) : arriving_bin(pair, cosine);
+            vec3 radiance = leaves_front ? l_front : l_back;
+            if (glossy != NONE) radiance += specular[glossy * BIN_COUNT + bin];
+            if (params.keeps_light != 0 && leaves_front && !blocks_behind) {
+                vec3 size = abs(held * radiance);
+                residual.y += size.r + size.g + size.b;
+                continue;
+            }
+            if (!leaves_front || blocks_behind) {
+                vec3 arriving = arriving_in(node, parent, bin), mean = leaves_front ? mean_back : mean_front;
+                uint at = bin * params.leaf_count + leaf;
+                if (params.sets_floor != 0) set_peak(at, arriving, mean);
+                else arriving = max(arriving, lowest_of(peaks[at], mean, params.undershoot));
+                radiance -= arriving;
+            }
+            SEND(entry_of(node, bin, params.node_count), held * radiance, residual)
+        }
+    }
+    residual_parts[part * params.leaf_count + leaf] += leaves[leaf].area * (4.0 * PI / float(BIN_COUNT)) * residual;
 }

@@ -4,13 +4,13 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per leaf and few bins: irradiance of both sides; and what arrives at fronts leaves backs that reflect nothing as
+// One thread per leaf and few pairs of bins: irradiance of both sides; and what arrives at fronts leaves backs that reflect nothing as
 // antiradiance, here, where it is at hand: these passes wait for memory.          [Dachsbacher2007 4.2 local pass, Eq. 19]
 // reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), means[2 leaf_count] (W m^-2 sr^-1), peaks[BIN_COUNT * leaf_count] (of the mean)
 // updates exitant (of leaves; intensity per area, W m^-2 sr^-1)
-// writes parts[BIN_COUNT / BINS_A_THREAD * 2 * leaf_count] (W/m2, fronts and backs of some bins one after the other),
-//        residual_parts[BIN_COUNT / BINS_A_THREAD * leaf_count] (W: how much the exitant light changed, how much there is)
+// writes parts[part_count * 2 * leaf_count] (W/m2, fronts and backs of some pairs one after the other),
+//        residual_parts[part_count * leaf_count] (W: how much the exitant light changed, how much there is)
 // shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -18,7 +18,7 @@ layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Environment { vec3 environment[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
@@ -35,9 +35,15 @@ layout(push_constant, scalar) uniform Params {
     uint add_environment;       // 1: the environment shines on every leaf, as if nothing were in the way
 } params;
 
-#include "methods/antiradiance/floor.glsl"
 #include "methods/antiradiance/local.glsl"
-#include "methods/antiradiance/table.glsl"
+
+// What arrives in a bin, not far below zero, times the cosine.
+vec3 held_in(HierarchyLeaf own, uint leaf, uint parent, uint bin, vec3 mean, float held)
+{
+    vec3 arriving = arriving_in(own.node, parent, bin);
+    if (params.sets_floor == 0) arriving = max(arriving, lowest_of(peaks[bin * params.leaf_count + leaf], mean, params.undershoot));
+    return held * arriving;
+}
 
 void main()
 {
@@ -46,32 +52,23 @@ void main()
     HierarchyLeaf own = leaves[leaf];
     uint parent = nodes[own.node].parent;
     float norm = cosine_norms[leaf], bin_solid_angle = 4.0 * PI / float(BIN_COUNT);
-    vec3 mean_front = means[2 * leaf], mean_back = means[2 * leaf + 1];
+    vec3 mean_front = means[2 * leaf];
     // What meets the back counts where it is reflected, and for the floor of what is taken away from it.
     bool needs_back = (own.flags & REFLECTS_BEHIND) != 0 || (params.sets_floor != 0 && (own.flags & BLOCKS_BEHIND) != 0);
 
     bool sends = params.sets_floor == 0 && (own.flags & REFLECTS_BEHIND) == 0;
 
-    // What travels against the normal arrives at the front.
     vec3 front = vec3(0.0), back = vec3(0.0);
     vec2 residual = vec2(0.0);      // change, sum
-    for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
-        float cosine = dot(own.normal, bin_directions[bin]);
-        if (cosine > 0.0 && !needs_back) continue;
-        vec3 arriving = arriving_in(own.node, parent, bin);
-        if (params.sets_floor == 0)
-            arriving = max(arriving, lowest_of(peaks[bin * params.leaf_count + leaf], cosine <= 0.0 ? mean_front : mean_back, params.undershoot));
-        arriving *= discrete_cosine(cosine, norm, BIN_COUNT);
-        if (cosine > 0.0) {
-            back += arriving;
-            continue;
-        }
+    for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
+        float cosine = dot(own.normal, BIN_DIRECTION(pair, BIN_COUNT)), held = discrete_cosine(cosine, norm, BIN_COUNT);
+        uint bin = arriving_bin(pair, cosine);
+        vec3 arriving = held_in(own, leaf, parent, bin, mean_front, held);
         front += arriving;
         if (sends) SEND(entry_of(own.node, bin, params.node_count), -arriving, residual)
+        if (needs_back) back += held_in(own, leaf, parent, leaving_bin(pair, cosine), means[2 * leaf + 1], held);
     }
-    front *= bin_solid_angle;
-    back *= bin_solid_angle;
     residual_parts[part * params.leaf_count + leaf] = own.area * bin_solid_angle * residual;
-    parts[2 * part * params.leaf_count + leaf] = front;
-    parts[(2 * part + 1) * params.leaf_count + leaf] = back;
+    parts[2 * part * params.leaf_count + leaf] = bin_solid_angle * front;
+    parts[(2 * part + 1) * params.leaf_count + leaf] = bin_solid_angle * back;
 }

@@ -1,4 +1,5 @@
 #version 460
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/brdf.glsl"
 #include "lib/direction_bins.glsl"
@@ -17,7 +18,7 @@ layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer ElementPositions { vec3 element_positions[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Visibility { float visibility[]; };
@@ -59,7 +60,7 @@ void main()
     if (i >= params.glossy_count * BIN_COUNT) return;
     uint leaf = glossy_leaves[i / BIN_COUNT];
     HierarchyLeaf own = leaves[leaf];
-    vec3 w = bin_directions[i % BIN_COUNT];
+    vec3 w = BIN_DIRECTION(i % BIN_COUNT, BIN_COUNT);
     bool leaves_front = dot(own.normal, w) > 0.0;
     if (!leaves_front && own.back_element == NONE) return;
     Surface s = glossy_surface(gloss[leaf], leaves_front ? own.normal : -own.normal);

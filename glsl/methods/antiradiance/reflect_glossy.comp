@@ -15,7 +15,7 @@ layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leav
 layout(set = 0, binding = 2, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer BinDirections { vec3 bin_directions[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Specular { vec3 specular[]; };
@@ -38,5 +38,5 @@ void main()
 {
     uint i = linear_index();
     if (i >= params.glossy_count * BIN_COUNT) return;
-    specular[i] = base[i] + glossy_radiance(glossy_leaves[i / BIN_COUNT], bin_directions[i % BIN_COUNT]);
+    specular[i] = base[i] + glossy_radiance(glossy_leaves[i / BIN_COUNT], BIN_DIRECTION(i % BIN_COUNT, BIN_COUNT));
 }

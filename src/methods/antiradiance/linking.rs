@@ -7,7 +7,7 @@
 
 use super::{Settings, Tables};
 use crate::gpu::shaders::methods::antiradiance as passes;
-use crate::gpu::shaders::types::{BinParams, PairCounters};
+use crate::gpu::shaders::types::{BinParams, FoundTransfer, PairCounters};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Threads};
 use crate::stages::direction_bins::{DeviceBins, Spread};
 use crate::stages::hierarchy::{Hierarchy, NONE};
@@ -26,6 +26,9 @@ const LENGTH_CLASSES: usize = 48;
 const WORKGROUP_NODES: u32 = 1024;
 /// Links a leaf that a first attempt has room for.
 const FIRST_GUESS: u64 = 64;
+/// Transfers of a link, both ways, that are kept from counting to filling; where there are more, they are made twice.
+const FOUND_A_LINK: u64 = 6;
+const TRANSFER_BYTES: u64 = 8;
 
 /// Why links cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -121,6 +124,12 @@ pub struct Transfers {
     node_count: u32,
 }
 
+/// All transfers as the links gave them, in any order.
+struct Found {
+    transfers: Buffer<FoundTransfer>,
+    count: u32,
+}
+
 /// What the kernels that make transfers read.
 struct Making<'a> {
     links: &'a NodeLinks,
@@ -157,10 +166,12 @@ impl Transfers {
         };
         let making = Making { links, hierarchy, bins, cosine_norms, params };
         let cells = context.buffer("antiradiance/cells", node_count as usize * bin_count as usize)?;
-        making.count(context, &cells)?;
+        let found = making.count(context, &cells, budget.min(context.available_bytes()))?;
 
         let (counts, class_counts) = count_cells(context, &cells, node_count, bin_count)?;
         let total: u64 = counts.iter().map(|bin| u64::from(bin[LENGTH_CLASSES])).sum();
+        // Rather made again than refused.
+        let found = found.filter(|found| total * TRANSFER_BYTES + found.transfers.size_bytes() <= budget);
         let available = budget.min(context.available_bytes());
         check_transfers(total, available)?;
         let (bin_slices, starts) = slices_of(&counts);
@@ -175,7 +186,7 @@ impl Transfers {
         let padded = u64::from(offsets[slice_count as usize]);
         check_transfers(padded, available)?;
         let ends: Vec<u32> = bin_slices.iter().map(|&slice| offsets[slice as usize]).collect();
-        for bins in plan_windows(&ends, context.limits().storage_buffer_bytes / size_of::<u64>() as u64)? {
+        for bins in plan_windows(&ends, context.limits().storage_buffer_bytes / TRANSFER_BYTES)? {
             let [first, end] = [bins.start, bins.end].map(|bin| ends[bin as usize]);
             let name = format!("antiradiance/transfers {}", result.windows.len());
             let window = TransferWindow {
@@ -184,7 +195,7 @@ impl Transfers {
                 first_transfer: first,
                 transfers: context.buffer(&name, (end - first) as usize)?,
             };
-            making.fill(context, &result, &window)?;
+            making.fill(context, &result, &window, found.as_ref())?;
             result.windows.push(window);
         }
         Ok(result)
@@ -255,33 +266,84 @@ impl Transfers {
 }
 
 impl Making<'_> {
-    /// Transfers of each cell.
-    fn count(&self, context: &Context, cells: &Buffer<u32>) -> Result<(), GpuError> {
+    /// Transfers of each cell; and the transfers, where `available` bytes allow.
+    fn count(&self, context: &Context, cells: &Buffer<u32>, available: u64) -> Result<Option<Found>, GpuError> {
         let (hierarchy, bins) = (self.hierarchy, self.bins);
+        // A quarter at most: the transfers themselves, and all else, come after.
+        let room = (available / 4).min(context.limits().storage_buffer_bytes) / size_of::<FoundTransfer>() as u64;
+        let capacity = room.min(FOUND_A_LINK * u64::from(self.links.count)) as u32;
+        let transfers = context.buffer("antiradiance/found transfers", capacity as usize)?;
+        let found_count = context.upload("antiradiance/found count", &[0u32])?;
         let pass = passes::CountTransfers {
             links: &self.links.pairs,
             nodes: &hierarchy.nodes,
             leaves: &hierarchy.leaves,
+            cosine_norms: self.cosine_norms,
             bin_directions: &bins.directions,
             spread_offsets: &bins.spread_offsets,
             spread: &bins.spread,
             cells,
+            found_count: &found_count,
+            found: &transfers,
             params: passes::CountTransfersParams {
                 bins: self.params,
                 link_count: self.links.count,
                 node_count: hierarchy.node_count(),
+                capacity,
             },
         };
         let mut recorder = context.recorder("links")?;
         recorder.fill(cells, 0);
         recorder.dispatch(&pass, self.links.count);
-        recorder.submit()
+        recorder.submit()?;
+        let count = context.download(&found_count)?[0];
+        Ok((count <= capacity).then_some(Found { transfers, count }))
     }
 
     /// The transfers of a window, by rising sender within each cell.
-    fn fill(&self, context: &Context, made: &Transfers, window: &TransferWindow) -> Result<(), GpuError> {
+    fn fill(
+        &self,
+        context: &Context,
+        made: &Transfers,
+        window: &TransferWindow,
+        found: Option<&Found>,
+    ) -> Result<(), GpuError> {
+        let node_count = self.hierarchy.node_count();
+        let slice_count = window.slices.len() as u32;
+        let sort = passes::SortTransfers {
+            work: &made.work,
+            slice_offsets: &made.slice_offsets,
+            cells: &made.cells,
+            transfers: &window.transfers,
+            params: passes::SortTransfersParams { first_slice: window.slices.start, slice_count },
+        };
+        let mut recorder = context.recorder("links")?;
+        recorder.fill(&window.transfers, 0);
+        match found {
+            None => recorder.dispatch(&self.fill_anew(made, window), self.links.count),
+            Some(found) => {
+                let pass = passes::PlaceTransfers {
+                    found: &found.transfers,
+                    cells: &made.cells,
+                    transfers: &window.transfers,
+                    params: passes::PlaceTransfersParams {
+                        found_count: found.count,
+                        first_cell: window.bins.start * node_count,
+                        end_cell: window.bins.end * node_count,
+                        first_transfer: window.first_transfer,
+                    },
+                };
+                recorder.dispatch(&pass, found.count);
+            }
+        }
+        recorder.dispatch(&sort, slice_count * SLICE);
+        recorder.submit()
+    }
+
+    /// The transfers of a window, made from the links once more.
+    fn fill_anew<'a>(&'a self, made: &'a Transfers, window: &'a TransferWindow) -> passes::FillTransfers<'a> {
         let (hierarchy, bins) = (self.hierarchy, self.bins);
-        let fill = passes::FillTransfers {
+        passes::FillTransfers {
             links: &self.links.pairs,
             nodes: &hierarchy.nodes,
             leaves: &hierarchy.leaves,
@@ -299,20 +361,7 @@ impl Making<'_> {
                 end_bin: window.bins.end,
                 first_transfer: window.first_transfer,
             },
-        };
-        let slice_count = window.slices.len() as u32;
-        let sort = passes::SortTransfers {
-            work: &made.work,
-            slice_offsets: &made.slice_offsets,
-            cells: &made.cells,
-            transfers: &window.transfers,
-            params: passes::SortTransfersParams { first_slice: window.slices.start, slice_count },
-        };
-        let mut recorder = context.recorder("links")?;
-        recorder.fill(&window.transfers, 0);
-        recorder.dispatch(&fill, self.links.count);
-        recorder.dispatch(&sort, slice_count * SLICE);
-        recorder.submit()
+        }
     }
 }
 
@@ -390,7 +439,7 @@ fn check_transfers(count: u64, available: u64) -> Result<(), LinkingError> {
     if count > u64::from(u32::MAX / 2) {
         return Err(LinkingError::TooMany(count));
     }
-    let needed = count * size_of::<u64>() as u64;
+    let needed = count * TRANSFER_BYTES;
     if needed > available {
         return Err(LinkingError::OutOfMemory { what: "transfers", needed, available });
     }

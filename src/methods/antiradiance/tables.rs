@@ -10,8 +10,10 @@ use crate::stages::elements::Elements;
 use crate::stages::hierarchy::Hierarchy;
 use glam::{Vec2, Vec3};
 
-/// Of one thread, in `table.glsl`.
+/// Bins of one thread, in `table.glsl`.
 const BINS_A_THREAD: u32 = 8;
+/// Pairs of opposite bins of one thread, in `local.glsl`.
+const PAIRS_A_THREAD: u32 = 4;
 
 /// Light by direction and node, and by leaf and side. Entry of a table: `bin * nodes + node`, [`Tables::words`] words of 64
 /// bits.
@@ -49,6 +51,8 @@ pub struct Tables {
     pub gloss: Gloss,
     /// Per thread's bins and leaf, W: change of the exitant light in the last step, and its sum.
     residual_parts: Buffer<Vec2>,
+    /// Per leaf, the same of what the fronts of plain leaves reflect and emit, which is in no part.
+    light_changes: Buffer<Vec2>,
     /// Per leaf, W: the same of all bins, and what of the light is reflected and emitted.
     pub residuals: Buffer<Vec3>,
 }
@@ -99,7 +103,7 @@ impl Tables {
         let bin_count = bins.bins.count();
         let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
         let (leaves, sides) = (hierarchy.leaf_count() as usize, 2 * hierarchy.leaf_count() as usize);
-        let parts = (bin_count / BINS_A_THREAD) as usize;
+        let parts = part_count(bin_count) as usize;
         Ok(Self {
             bin_count,
             half,
@@ -119,6 +123,7 @@ impl Tables {
             peaks: context.buffer("antiradiance/peaks", leaves * bin_count as usize)?,
             irradiance_parts: context.buffer("antiradiance/irradiance parts", sides * parts)?,
             residual_parts: context.buffer("antiradiance/residual parts", leaves * parts)?,
+            light_changes: context.buffer("antiradiance/light changes", leaves)?,
             residuals: context.buffer("antiradiance/residuals", leaves)?,
         })
     }
@@ -215,9 +220,10 @@ impl Tables {
         }
         let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
         let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
-        let part_count = bin_count / BINS_A_THREAD;
+        let part_count = part_count(bin_count);
         let undershoot = if step.cuts { 0.0 } else { step.bounced * self.undershoot };
         let (sets_floor, add_environment) = (u32::from(step.sets_floor), u32::from(step.has_environment));
+        let is_undamped = u32::from(!step.sets_floor && step.damping == 1.0);
         let irradiance = passes::LocalIrradiance {
             leaves: &hierarchy.leaves,
             nodes: &hierarchy.nodes,
@@ -248,11 +254,14 @@ impl Tables {
             radiosity: &self.radiosity,
             means: &self.means,
             irradiance: &self.irradiance,
+            glossy_of_leaf: &self.gloss.glossy_of_leaf,
+            light_changes: &self.light_changes,
             params: passes::LocalReflectParams {
                 leaf_count,
                 part_count,
                 update_radiosity: u32::from(step.reflects),
                 sets_floor,
+                is_undamped,
             },
         };
         let exitant = passes::LocalExitant {
@@ -276,8 +285,9 @@ impl Tables {
                 sets_floor,
                 undershoot,
                 damping: step.damping,
-                keeps_light: u32::from(!step.reflects && !step.sets_floor && step.damping == 1.0),
+                keeps_light: u32::from(!step.reflects) & is_undamped,
                 add_environment,
+                is_undamped,
             },
         };
         let residual = passes::LocalResidual {
@@ -285,6 +295,7 @@ impl Tables {
             leaves: &hierarchy.leaves,
             radiosity: &self.radiosity,
             residuals: &self.residuals,
+            light_changes: &self.light_changes,
             params: passes::LocalResidualParams { leaf_count, part_count },
         };
         recorder.scope("local", |recorder| {
@@ -306,6 +317,11 @@ impl Tables {
             });
         });
     }
+}
+
+/// Threads that share a leaf's bins in the local pass.
+fn part_count(bin_count: u32) -> u32 {
+    (bin_count / 2).div_ceil(PAIRS_A_THREAD)
 }
 
 /// Mean radiance of the environment's light that travels along each bin.
