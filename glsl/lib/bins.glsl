@@ -44,7 +44,6 @@ const uint OF_FLAT_LEAVES = 1;  // whose triangles lie in one plane
 const uint OF_PLANES = 2;       // nodes about a plane, seen by their ellipses
 const uint OF_OUTLINES = 3;     // nodes without one, seen by their outlines
 const uint KINDS = 4;
-const float FLAT = 1e-3;        // a leaf as thin as this, against its radius, is a plane
 
 // What was counted while links were made.
 struct LinkCounts {
@@ -80,12 +79,17 @@ uint face_of(vec3 d)
     return 2 * axis + (along < 0.0 ? 1u : 0u);
 }
 
+// A whole number from 0 to 2^23 - 1, from the bits of its sum with 2^23: software drivers convert thread by thread.
+uint as_uint(float whole) { return floatBitsToUint(whole + 8388608.0) & 0x7fffffu; }
+
+uint bin_at(uint face, vec2 cell, uint n) { return face * n * n + as_uint(cell.y * float(n) + cell.x); }
+
 uint bin_of(vec3 d, uint n)
 {
     uint face = face_of(d);
     vec3 at = in_face(face, d);
-    uvec2 cell = min(uvec2(clamp(0.5 * at.xy / at.z + 0.5, 0.0, 1.0) * float(n)), uvec2(n - 1));
-    return (face * n + cell.y) * n + cell.x;
+    vec2 cell = min(floor(clamp(0.5 * at.xy / at.z + 0.5, 0.0, 1.0) * float(n)), vec2(n - 1));
+    return bin_at(face, cell, n);
 }
 
 // Place in -1..1 of a cell's centre.

@@ -12,10 +12,24 @@ struct SeenOutline {
     vec3 spread;        // squares of the outline's half widths: (c x a)^2 + (c x b)^2 - (a x b)^2, or r^2 (c.c - r^2 - c^2)
 };
 
-SeenOutline seen_ellipse(vec3 c, vec3 a, vec3 b)
+// An ellipse as directions d meet it: at x = -(d . of_b) / (d . of_plane), y = (d . of_a) / (d . of_plane).
+struct SeenEllipse {
+    vec3 of_a;          // c x a
+    vec3 of_b;          // c x b
+    vec3 of_plane;      // a x b
+    float volume;       // c . a x b
+};
+
+SeenEllipse seen_ellipse(vec3 c, vec3 a, vec3 b)
 {
-    vec3 p = cross(c, a), q = cross(c, b), t = cross(a, b);
-    return SeenOutline(c, c * c - a * a - b * b, c * c.yzx - a * a.yzx - b * b.yzx, p * p + q * q - t * t);
+    vec3 across = cross(a, b);
+    return SeenEllipse(cross(c, a), cross(c, b), across, dot(c, across));
+}
+
+SeenOutline outline_of(SeenEllipse e, vec3 c, vec3 a, vec3 b)
+{
+    vec3 spread = e.of_a * e.of_a + e.of_b * e.of_b - e.of_plane * e.of_plane;
+    return SeenOutline(c, c * c - a * a - b * b, c * c.yzx - a * a.yzx - b * b.yzx, spread);
 }
 
 SeenOutline seen_sphere(vec3 c, float radius)
@@ -45,62 +59,36 @@ vec4 ranges_in_face(SeenOutline o, uint face)
     return clamp(vec4(middle - reach, middle + reach).xzyw / squared, -1.0, 1.0);
 }
 
-// Cells of a row whose centres lie between two places in -1..1.
-ivec2 cells_between(vec2 range, uint n)
+// The first and the last cell of a row whose centres lie between two places in -1..1.
+vec2 cells_between(vec2 range, uint n)
 {
     vec2 at = 0.5 * (range + 1.0) * float(n) - 0.5;
-    return clamp(ivec2(ceil(at.x), floor(at.y)), ivec2(0, -1), ivec2(n, int(n) - 1));
+    return vec2(max(ceil(at.x), 0.0), min(floor(at.y), float(n) - 1.0));
 }
 
-// A walk over these cells. Where threads run in lockstep, each has its own cell and face in every turn.
+// The faces beyond the rims that an outline crosses on the face that its centre lies in; all, where it reaches beside the eye.
+uint faces_beside(SeenOutline o, uint face, vec4 ranges)
+{
+    uint axis = face >> 1, beside_u = 2 * (axis == 2 ? 0 : axis + 1), beside_v = 2 * (axis == 0 ? 2 : axis - 1);
+    uint crossed = (ranges.y >= 1.0 ? 1u << beside_u : 0u) | (ranges.x <= -1.0 ? 2u << beside_u : 0u)
+                   | (ranges.w >= 1.0 ? 1u << beside_v : 0u) | (ranges.z <= -1.0 ? 2u << beside_v : 0u);
+    return along_axis(face, o.diagonal) <= 0.0 ? 63u & ~(1u << face) : crossed;
+}
+
+// The cells of a rectangle, row by row, in whole numbers; none where `last` lies before `at`.
 struct CellWalk {
-    uint faces;         // still to come, bits
-    uint face;
-    int left;           // column that rows start at
-    ivec2 cell;         // column and row
-    ivec2 last;
+    vec2 at;            // column and row
+    vec2 last;
+    float left;         // column that rows start at
 };
 
-void walk_rectangle(inout CellWalk w, vec4 ranges, uint n)
+CellWalk walk_cells(vec4 ranges, uint n)
 {
-    ivec2 columns = cells_between(ranges.xy, n), rows = cells_between(ranges.zw, n);
-    w.left = columns.x;
-    w.cell = ivec2(columns.x, rows.x);
-    w.last = ivec2(columns.y, columns.x <= columns.y ? rows.y : -1);
+    vec2 columns = cells_between(ranges.xy, n), rows = cells_between(ranges.zw, n);
+    return CellWalk(vec2(columns.x, rows.x), vec2(columns.y, columns.x <= columns.y ? rows.y : -1.0), columns.x);
 }
 
-// To the next face with cells, where the present rectangle is done.
-void find_rectangle(SeenOutline o, inout CellWalk w, uint n)
-{
-    while (w.last.y < w.cell.y && w.faces != 0) {
-        w.face = uint(findLSB(w.faces));
-        w.faces &= w.faces - 1;
-        walk_rectangle(w, ranges_in_face(o, w.face), n);
-    }
-}
+bool has_cell(CellWalk w) { return w.at.y <= w.last.y; }
 
-// Starts with the face that the centre lies in; others are those beyond the rims that the outline crosses there.
-CellWalk walk_cells(SeenOutline o, uint n)
-{
-    CellWalk w = CellWalk(0, face_of(o.centre), 0, ivec2(0), ivec2(-1));
-    if (along_axis(w.face, o.diagonal) <= 0.0) {
-        w.faces = 63;       // it reaches beside or behind the eye
-    } else {
-        vec4 ranges = ranges_in_face(o, w.face);
-        uint axis = w.face >> 1, beside_u = 2 * (axis == 2 ? 0 : axis + 1), beside_v = 2 * (axis == 0 ? 2 : axis - 1);
-        w.faces = (ranges.y >= 1.0 ? 1u << beside_u : 0u) | (ranges.x <= -1.0 ? 2u << beside_u : 0u)
-                  | (ranges.w >= 1.0 ? 1u << beside_v : 0u) | (ranges.z <= -1.0 ? 2u << beside_v : 0u);
-        walk_rectangle(w, ranges, n);
-    }
-    if (w.last.y < w.cell.y && w.faces != 0) find_rectangle(o, w, n);
-    return w;
-}
-
-bool has_cell(CellWalk w) { return w.cell.y <= w.last.y; }
-
-void next_cell(SeenOutline o, inout CellWalk w, uint n)
-{
-    w.cell = w.cell.x < w.last.x ? ivec2(w.cell.x + 1, w.cell.y) : ivec2(w.left, w.cell.y + 1);
-    if (w.last.y < w.cell.y && w.faces != 0) find_rectangle(o, w, n);
-}
+void next_cell(inout CellWalk w) { w.at = w.at.x < w.last.x ? vec2(w.at.x + 1.0, w.at.y) : vec2(w.left, w.at.y + 1.0); }
 #endif

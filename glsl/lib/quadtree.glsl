@@ -46,13 +46,10 @@ struct LeafCell {
 const uint CELL_OF_BACK = 1;            // it looks against the triangles' normals
 const uint CELL_HAS_OTHER_SIDE = 2;     // another leaf looks the other way
 
-// A triangle around a vertex: products of the offset from the vertex with `along_p` and `along_q` are the barycentric
-// coordinates of the other corners, in order.
-struct CellCorner {
-    vec3 across;        // normal to the triangle, of twice its area
-    vec3 along_p;       // 1/m
-    vec3 along_q;       // 1/m; without area both are beyond all bounds
-};
+// A triangle around a vertex, in texels: products of the offset from the vertex with `along_p` and `along_q` are the
+// barycentric coordinates of the other corners, in order; without area both are beyond all bounds.
+//   0, 1: along_p; along_q (1/m)
+const uint CORNER_TEXELS = 2;
 
 // A step of the walk over all nodes from the roots down: where it goes on where a node's children are not looked at.
 struct WalkStep {

@@ -6,7 +6,8 @@
 // One thread per leaf: the surfel of its element, from the third of each triangle around that belongs to it.   [Dong2007 4.1]
 // reads leaf_elements[leaf_count], element_vertices, element_normals [element_count], positions, triangles,
 // incident_offsets[vertex_count + 1], incident_triangles, back_elements[vertex_count]
-// writes surfels, moments [leaf_count ..], leaf_cells[leaf_count], cell_corners (as incident_triangles)   shared none
+// writes surfels, moments [leaf_count ..], leaf_cells[leaf_count], corner_texels[CORNER_TEXELS *
+// incident_triangles]   shared none
 // Differs from [Dong2007]: an ellipse about the middle of the vertex's cell instead of a disc about the vertex, so that
 // cells on edges and long cells cover no more than is there, and all of it.
 layout(local_size_x = 64) in;
@@ -21,7 +22,7 @@ layout(set = 0, binding = 7, scalar) writeonly buffer Surfels { Surfel surfels[]
 layout(set = 0, binding = 8, scalar) writeonly buffer Moments { SurfelMoments moments[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer BackElements { uint back_elements[]; };
 layout(set = 0, binding = 10, scalar) writeonly buffer LeafCells { LeafCell leaf_cells[]; };
-layout(set = 0, binding = 11, scalar) writeonly buffer CellCorners { CellCorner cell_corners[]; };
+layout(set = 0, binding = 11, scalar) writeonly buffer CornerTexels { uvec4 corner_texels[]; };
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
 
 void main()
@@ -51,9 +52,12 @@ void main()
         q -= origin;
         if (!is_back) {
             vec3 normal = cross(p, q);
-            cell_corners[k] = CellCorner(normal, vec3(1e20), vec3(1e20));       // without area: no place is in it
             float squared = dot(normal, normal);
-            if (squared > 0.0) cell_corners[k] = CellCorner(normal, cross(q, normal) / squared, cross(normal, p) / squared);
+            // Without area: no place is in it.
+            vec3 along_p = squared > 0.0 ? cross(q, normal) / squared : vec3(1e20);
+            vec3 along_q = squared > 0.0 ? cross(normal, p) / squared : vec3(1e20);
+            corner_texels[CORNER_TEXELS * k] = uvec4(floatBitsToUint(along_p), 0);
+            corner_texels[CORNER_TEXELS * k + 1] = uvec4(floatBitsToUint(along_q), 0);
         }
         vec3 centre = (p + q) / 3.0;
         for (uint half_index = 0; half_index < 2; ++half_index) {

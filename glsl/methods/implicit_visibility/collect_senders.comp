@@ -4,6 +4,7 @@
 #include "lib/hemisphere.glsl"
 #include "lib/quadtree.glsl"
 #include "methods/implicit_visibility/horizon.glsl"
+#include "methods/implicit_visibility/link_texels.glsl"
 
 // One thread per group of receiving nodes: walks all trees, down to where a sender fits into a bin of all of the group's
 // nodes, and holds those senders, by kind, for linking. Where a list is full it stops, to go on from there the next time.
@@ -70,7 +71,7 @@ void main()
     ReceiverGroup group = receiver_groups[params.first_group + slot];
     bool has_above = group.above_count > 0, of_leaves = group.first < params.leaf_count;
     Surfel own = surfels[group.node], above = surfels[has_above ? group.above_node : group.node];
-    Extents receiver = Extents(own.normal, own.cos_cone, own.radius, own.thickness);
+    Horizon receiver = Horizon(own.normal, own.cos_cone, reach_above(own.cos_cone, own.radius, own.thickness));
     float area = largest_area(group.first, group.count), area_above = largest_area(group.above_first, group.above_count);
 
     GroupWalk at = group_walks[slot];
@@ -90,7 +91,7 @@ void main()
         ++visited;
 
         vec3 offset = centre.xyz - own.centre;
-        bool is_dropped = is_below_horizon(receiver, Extents(facing.xyz, 0.0, radius, thickness), offset);
+        bool is_dropped = is_below_horizon(receiver, Extents(facing.xyz, radius, thickness), offset);
 
         vec3 from_above = centre.xyz - above.centre;
         float nearest_above = length(from_above) - above.radius;
@@ -107,8 +108,8 @@ void main()
         is_dropped = is_dropped || (!of_leaves && !may_fit);    // left to the children
 
         if (!is_dropped && !is_refined) {
-            uint of_leaf = thickness <= FLAT * radius ? OF_FLAT_LEAVES : OF_LEAVES;
-            uint of_node = cos_cone < 0.5 ? OF_OUTLINES : OF_PLANES;
+            uint of_leaf = is_flat(thickness, radius) ? OF_FLAT_LEAVES : OF_LEAVES;
+            uint of_node = has_plane(cos_cone) ? OF_PLANES : OF_OUTLINES;
             uvec4 is_kind = uvec4(equal(uvec4(0, 1, 2, 3), uvec4(is_leaf ? of_leaf : of_node)));
             uvec4 place = is_kind * (at.held + uvec4(0, 1, 2, 3) * params.capacity);
             held_senders[first + place.x + place.y + place.z + place.w] = sender;

@@ -75,13 +75,15 @@ void main()
     parent_row = has_parent ? above.row + parent - above.first : own_row;
     frame = receivers[leaf].frame;
     vec3 normal = turn_back(frame, receivers[leaf].normal);
+    uint face = i / own.count / params.n, row = i / own.count % params.n;
 
     // At most 64 bins; those that are empty come second, together: few are, and only there is much to do.
     uvec2 empty = uvec2(0);
     for (uint k = 0; k < params.n; ++k) {
         uint64_t key = key_of(first_bin + k);
         winners[(first_bin + k) * own.count + local] = unpackUint2x32(key).x;       // of NO_KEY: EMPTY_BIN
-        bool is_seen = dot(bin_direction(first_bin + k, params.n), normal) > 0.0;
+        vec2 uv = vec2(cell_centre(k, params.n), cell_centre(row, params.n));
+        bool is_seen = dot(face_direction(face, uv), normal) > 0.0;
         uint bit = key == NO_KEY && is_seen ? params.fills_holes << (k & 31) : 0u;
         empty |= k < 32 ? uvec2(bit, 0) : uvec2(0, bit);
     }

@@ -1,13 +1,15 @@
 //! From surfels to winners: links are made, refined and pushed down, window after window.
 
 use super::windows::{self, WindowPlan};
-use super::{Footprint, Settings, bins};
+use super::{Footprint, Frames, Settings, bins};
 use crate::gpu::shaders::methods::implicit_visibility as passes;
 use crate::gpu::shaders::types::{GroupWalk, LinkCounts, Receiver, ReceiverGroup, WindowLevel};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
+use crate::stages::elements::Elements;
 use crate::stages::quadtree::Quadtrees;
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use crate::stages::work::{Interrupted, Watch};
+use crate::stages::world::World;
 use glam::Vec3;
 use std::ops::Range;
 
@@ -19,6 +21,9 @@ const LINKERS: u32 = 64;
 const CAPACITY: u32 = 1 << 10;
 /// Kinds of senders, in the order of `lib/bins.glsl`: leaves, flat ones, nodes about a plane, nodes without one.
 const KINDS: u32 = 4;
+/// Texels of a node as sender and as receiver; the layout is that of `link_texels.glsl`.
+const SENDER_TEXELS: usize = 5;
+const RECEIVER_TEXELS: usize = 3;
 /// Threads per node that push links down.
 const PUSHERS: usize = 16;
 
@@ -59,6 +64,9 @@ pub struct Linking {
     /// Integral of the unit direction over each bin, sr.
     pub bin_vectors: Buffer<Vec3>,
     pub receivers: Buffer<Receiver>,
+    /// What links are made from, of all nodes.
+    sender_texels: TexelBuffer,
+    receiver_texels: TexelBuffer,
     pub windows: Vec<Window>,
     /// Of the window linked last: of each node and bin, distance bits above, back and node below.
     pub keys: Buffer<u64>,
@@ -89,7 +97,8 @@ impl Sizes {
         let rows = windows.iter().map(WindowPlan::row_count).max().unwrap_or(0);
         let keys = rows as usize * bins as usize;
         let leaves = u64::from(trees.leaf_count());
-        let receiver_bytes = leaves * size_of::<Receiver>() as u64;
+        let node_bytes = 16 * (SENDER_TEXELS + RECEIVER_TEXELS) as u64 * u64::from(trees.node_count());
+        let receiver_bytes = leaves * size_of::<Receiver>() as u64 + node_bytes;
         let most_groups = windows.iter().map(|window| window.groups.iter().map(Vec::len).sum::<usize>()).max();
         let groups = most_groups.unwrap_or(0).min(GROUPS_AT_ONCE as usize);
         let held_bytes = groups as u64 * (u64::from(4 * KINDS * CAPACITY) + size_of::<GroupWalk>() as u64);
@@ -110,7 +119,7 @@ impl Linking {
         settings: &Settings,
         sizes: Sizes,
     ) -> Result<Self, GpuError> {
-        let n = settings.bins;
+        let (n, nodes) = (settings.bins, trees.topology.node_count() as usize);
         let mut windows = Vec::with_capacity(sizes.windows.len());
         for (index, plan) in sizes.windows.into_iter().enumerate() {
             let count = plan.leaves().len() * settings.bin_count() as usize;
@@ -129,6 +138,8 @@ impl Linking {
             bin_solid_angles: context.upload("implicit/bin solid angles", &bins::solid_angles(n))?,
             bin_vectors: context.upload("implicit/bin vectors", &bins::vectors(n))?,
             receivers: context.buffer("implicit/receivers", trees.topology.leaf_count() as usize)?,
+            sender_texels: context.texel_buffer("implicit/sender texels", (SENDER_TEXELS * nodes).max(1))?,
+            receiver_texels: context.texel_buffer("implicit/receiver texels", (RECEIVER_TEXELS * nodes).max(1))?,
             windows,
             keys: context.buffer("implicit/keys", sizes.keys)?,
             counts: context.buffer("implicit/link counts", 1)?,
@@ -226,11 +237,9 @@ impl Linking {
         for kind in 0..KINDS {
             let pass = passes::CreateLinks {
                 receiver_groups: &window.groups,
-                surfels: &trees.surfels,
-                moments: &trees.moments,
-                receivers: &self.receivers,
-                leaf_cells: &trees.leaf_cells,
-                cell_corners: &trees.cell_corners,
+                sender_texels: &self.sender_texels,
+                receiver_texels: &self.receiver_texels,
+                corner_texels: &trees.corner_texels,
                 group_walks: &self.group_walks,
                 held_senders: &self.held_senders,
                 keys: &self.keys,
@@ -240,16 +249,49 @@ impl Linking {
                     is_single: u32::from(settings.footprint() == Footprint::Single),
                     is_turned: u32::from(settings.is_turned()),
                 },
-                params: passes::CreateLinksParams {
-                    first_group,
-                    group_count,
-                    n: settings.bins,
-                    leaf_count,
-                    capacity: CAPACITY,
-                },
+                params: passes::CreateLinksParams { first_group, group_count, n: settings.bins, capacity: CAPACITY },
             };
             recorder.dispatch(&pass, LINKERS * group_count);
         }
+    }
+
+    /// Where leaves receive, and all nodes laid out for links, once surfels are pulled.          [Dong2007 4.2.1]
+    pub(super) fn place(
+        &self,
+        recorder: &mut Recorder<'_>,
+        world: &World,
+        elements: &Elements,
+        trees: &Quadtrees,
+        settings: &Settings,
+    ) {
+        let (leaf_count, node_count) = (trees.topology.leaf_count(), trees.topology.node_count());
+        let pass = passes::Receivers {
+            leaf_elements: &trees.leaf_elements,
+            ray_origins: &elements.ray_origins,
+            element_normals: &elements.normals,
+            element_vertices: &elements.vertices,
+            positions: &world.positions,
+            triangles: &world.triangles,
+            incident_offsets: &elements.incident_offsets,
+            incident_triangles: &elements.incident_triangles,
+            receivers: &self.receivers,
+            params: passes::ReceiversParams {
+                leaf_count,
+                follows_surface: u32::from(settings.frames == Frames::Surface),
+                spin: settings.spin.to_radians(),
+            },
+        };
+        recorder.dispatch(&pass, leaf_count);
+        let pass = passes::PackNodes {
+            surfels: &trees.surfels,
+            moments: &trees.moments,
+            leaf_cells: &trees.leaf_cells,
+            receivers: &self.receivers,
+            sender_texels: self.sender_texels.buffer(),
+            receiver_texels: self.receiver_texels.buffer(),
+            params: passes::PackNodesParams { node_count, leaf_count },
+        };
+        recorder.dispatch(&pass, node_count);
     }
 
     fn push_down(&self, recorder: &mut Recorder<'_>, trees: &Quadtrees, settings: &Settings, window: &Window) {

@@ -170,7 +170,7 @@ impl ImplicitVisibility {
             self.elements.place(recorder, world);
             self.update_materials(recorder, world);
             self.trees.pull_surfels(recorder, &self.elements, world); // UpdateElements
-            self.place_receivers(recorder, world);
+            self.linking.place(recorder, world, &self.elements, &self.trees, &self.settings);
         });
         recorder.submit()?;
 
@@ -189,28 +189,6 @@ impl ImplicitVisibility {
         recorder.submit()?;
         self.report.links_kept = context.download(&self.linking.counts)?[0].kept.into();
         Ok(())
-    }
-
-    fn place_receivers(&self, recorder: &mut Recorder<'_>, world: &World) {
-        let elements = &self.elements;
-        let leaf_count = self.trees.topology.leaf_count();
-        let pass = passes::Receivers {
-            leaf_elements: &self.trees.leaf_elements,
-            ray_origins: &elements.ray_origins,
-            element_normals: &elements.normals,
-            element_vertices: &elements.vertices,
-            positions: &world.positions,
-            triangles: &world.triangles,
-            incident_offsets: &elements.incident_offsets,
-            incident_triangles: &elements.incident_triangles,
-            receivers: &self.linking.receivers,
-            params: passes::ReceiversParams {
-                leaf_count,
-                follows_surface: u32::from(self.settings.frames == Frames::Surface),
-                spin: self.settings.spin.to_radians(),
-            },
-        };
-        recorder.dispatch(&pass, leaf_count);
     }
 
     /// Counts, and the lists of light links.

@@ -10,7 +10,7 @@ pub mod topology;
 use super::elements::Elements;
 use super::world::World;
 use crate::gpu::shaders::quadtree as passes;
-use crate::gpu::shaders::types::{CellCorner, LeafCell, QuadtreeSegment, Surfel, SurfelMoments, WalkStep};
+use crate::gpu::shaders::types::{LeafCell, QuadtreeSegment, Surfel, SurfelMoments, WalkStep};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use glam::Vec3;
 use topology::QuadtreeTopology;
@@ -27,16 +27,17 @@ pub struct Quadtrees {
     pub moments: Buffer<SurfelMoments>,
     /// One per leaf.
     pub leaf_cells: Buffer<LeafCell>,
-    /// One per entry of the elements' incident triangles.
-    pub cell_corners: Buffer<CellCorner>,
+    /// `CORNER_TEXELS` per entry of the elements' incident triangles.
+    pub corner_texels: TexelBuffer,
     /// One per node.
     walk: Buffer<WalkStep>,
     /// The same with what a walk looks at, `WALK_TEXELS` per node.
     pub walk_texels: TexelBuffer,
 }
 
-/// Texels of a step of the walk; the layout is that of `lib/quadtree.glsl`.
+/// Texels of a step of the walk and of a corner of a leaf's cell; the layouts are those of `lib/quadtree.glsl`.
 const WALK_TEXELS: usize = 3;
+const CORNER_TEXELS: usize = 2;
 
 impl Quadtrees {
     /// Uploads the topology; [`Self::pull_surfels`] places the nodes.
@@ -50,7 +51,7 @@ impl Quadtrees {
             surfels: context.buffer("quadtree/surfels", count)?,
             moments: context.buffer("quadtree/moments", count)?,
             leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
-            cell_corners: context.buffer("quadtree/cell corners", corner_count)?,
+            corner_texels: context.texel_buffer("quadtree/corner texels", (CORNER_TEXELS * corner_count).max(1))?,
             walk: context.upload("quadtree/walk", &topology.walk())?,
             walk_texels: context.texel_buffer("quadtree/walk texels", (WALK_TEXELS * count).max(1))?,
             topology,
@@ -63,7 +64,7 @@ impl Quadtrees {
         let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + walk + size_of::<u32>();
         u64::from(topology.node_count()) * node as u64
             + u64::from(topology.leaf_count()) * (size_of::<LeafCell>() + size_of::<u32>()) as u64
-            + (corner_count * size_of::<CellCorner>()) as u64
+            + (16 * CORNER_TEXELS * corner_count) as u64
             + (topology.segments.len() * size_of::<QuadtreeSegment>()) as u64
     }
 
@@ -82,7 +83,7 @@ impl Quadtrees {
             surfels: &self.surfels,
             moments: &self.moments,
             leaf_cells: &self.leaf_cells,
-            cell_corners: &self.cell_corners,
+            corner_texels: self.corner_texels.buffer(),
             params: passes::LeafSurfelsParams { leaf_count },
         };
         recorder.dispatch(&pass, leaf_count);
