@@ -8,7 +8,7 @@
 #include "trace/holes.glsl"
 
 // One thread per pixel: gathers from the sender tree, seeing by the maps of objects that move; by our own traversal what
-// stands close by, where their hulls overlap, and the environment.                                              [Ritschel2008 3.3, 4.4]
+// stands close by or is in doubt, where their hulls overlap, and the environment.                                              [Ritschel2008 3.3, 4.4]
 // reads the G-buffer, the sender tree, the maps, the objects, the hierarchy and what tells its holes, the environment
 // updates direct, indirect, gather_counts [pixel_count]   shared none
 layout(constant_id = 3) const bool CHECKED = false;
@@ -49,6 +49,13 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || is_near) return false;
     uint own_place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
     RigidPoint own = RigidPoint(origin, receiver.geometric, object, own_place, map_origins[own_place]);
+    if (CHECKED) {
+        uint place = leaf_maps[leaf].place;
+        RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, place, map_origins[place]);
+        bool is_free, is_sure = rigid_is_sure(map_frame[0], sender, own, is_free);
+        free = is_free ? 1.0 : 0.0;
+        return is_sure;
+    }
     SenderPlaces asked = sender_places(map_frame[0], leaf_maps[leaf], place_on_leaf(shape, target), origin);
     for (uint k = 0; k < asked.count; ++k) {
         RigidPoint sender = RigidPoint(target, leaf_normal(shape), sender_object, asked.place[k], map_origins[asked.place[k]]);

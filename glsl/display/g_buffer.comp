@@ -23,17 +23,31 @@ layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D g_albedo;
 layout(set = 0, binding = 11, rgba32f) writeonly uniform image2D g_specular;
 layout(set = 0, binding = 12, rgba32f) writeonly uniform image2D g_emission;
 layout(set = 1, binding = 0) uniform sampler2D textures[];
-// eye: position and 1, or the direction to an orthographic eye and 0.
-layout(push_constant, scalar) uniform Params { mat4 clip_from_world; vec4 eye; } params;
+// eye: position and 1, or the direction to an orthographic eye and 0; footprint: side of what is sampled, pixels.
+layout(push_constant, scalar) uniform Params { mat4 clip_from_world; vec4 eye; float footprint; } params;
 
-// What one pixel step to the right and down changes in each UV set.
-vec4 uv0_steps, uv1_steps;
+const uint MAX_TAPS = 16;
 
-vec4 sample_texture(uint index, vec2 uv)
+// Texture coordinates where the footprint ends to the right and below.
+VertexAttributes right_of, below;
+
+// The mean over the footprint, a parallelogram on the texture: along its longer side in taps as long as it is wide, each of
+// the mip level of that width. One tap for all of it would smear what is seen at a grazing angle.
+vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    // A texture transform changes the steps a little; the larger of both sets' steps is on the safe side.
-    vec2 dx = max(abs(uv0_steps.xy), abs(uv1_steps.xy)), dy = max(abs(uv0_steps.zw), abs(uv1_steps.zw));
-    return textureGrad(textures[nonuniformEXT(index)], uv, dx, dy);
+    vec2 to_right = slot_uv(slot, right_of) - uv, down = slot_uv(slot, below) - uv;
+    vec2 size = vec2(textureSize(textures[nonuniformEXT(slot.texture)], 0));
+    vec2 u = to_right * size, v = down * size;
+    bool is_right = dot(u, u) >= dot(v, v);
+    float longer = sqrt(is_right ? dot(u, u) : dot(v, v));
+    float width = max(abs(u.x * v.y - u.y * v.x) / max(longer, 1e-20), 1.0);
+    uint taps = clamp(uint(ceil(min(longer / width, float(MAX_TAPS)))), 1u, MAX_TAPS);
+    float level = log2(max(width, longer / float(taps)));
+    vec2 tap = (is_right ? to_right : down) / float(taps);
+    vec4 sum = vec4(0.0);
+    for (uint k = 0; k < taps; ++k)
+        sum += textureLod(textures[nonuniformEXT(slot.texture)], uv + (float(k) + 0.5 - 0.5 * float(taps)) * tap, level);
+    return sum / float(taps);
 }
 
 // Perspective-correct barycentrics at a place of the picture, by Cramer's rule on (x, y, w) of the corners.
@@ -63,16 +77,11 @@ void main()
     vec2 ndc = (vec2(pixel) + 0.5) * step_ndc - 1.0;
     vec3 w = clamp(barycentrics_at(a, b, c, ndc), 0.0, 1.0);
     w /= w.x + w.y + w.z;
-    vec3 right = barycentrics_at(a, b, c, ndc + vec2(step_ndc.x, 0.0)) - w;
-    vec3 down = barycentrics_at(a, b, c, ndc + vec2(0.0, step_ndc.y)) - w;
 
     VertexAttributes f = attributes[v.x], g = attributes[v.y], h = attributes[v.z];
-    VertexAttributes at;
-    at.uv0 = w.x * f.uv0 + w.y * g.uv0 + w.z * h.uv0;
-    at.uv1 = w.x * f.uv1 + w.y * g.uv1 + w.z * h.uv1;
-    at.color = w.x * f.color + w.y * g.color + w.z * h.color;
-    uv0_steps = vec4(right.x * f.uv0 + right.y * g.uv0 + right.z * h.uv0, down.x * f.uv0 + down.y * g.uv0 + down.z * h.uv0);
-    uv1_steps = vec4(right.x * f.uv1 + right.y * g.uv1 + right.z * h.uv1, down.x * f.uv1 + down.y * g.uv1 + down.z * h.uv1);
+    VertexAttributes at = interpolated(f, g, h, w);
+    right_of = interpolated(f, g, h, barycentrics_at(a, b, c, ndc + vec2(params.footprint * step_ndc.x, 0.0)));
+    below = interpolated(f, g, h, barycentrics_at(a, b, c, ndc + vec2(0.0, params.footprint * step_ndc.y)));
 
     vec3 position = w.x * p0 + w.y * p1 + w.z * p2;
     vec3 geometric = cross(p1 - p0, p2 - p0);

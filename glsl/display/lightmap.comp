@@ -7,7 +7,8 @@
 // One thread per pixel: all light but the punctual one, from the atlas by a bicubic filter over the texels of the chart
 // that is seen.                                                                                  [Ritschel2008 Fig. 17]
 // reads the G-buffer, triangles, positions, corner_places[2 * triangle_count], texel_at[resolution^2],
-//       texel_charts, direct_irradiance, indirect_irradiance [texel_count] (W/m2)
+//       texel_charts, texels, direct_irradiance, indirect_irradiance [texel_count] (W/m2),
+//       direct_gloss, indirect_gloss [resolution^2] (W m^-2 sr^-1, towards the eye)
 // updates direct, indirect [pixel_count]   shared none
 layout(set = 0, binding = 8, scalar) readonly buffer CornerPlaces { TriangleCorners corner_places[]; };    // fronts, then backs
 layout(set = 0, binding = 9, scalar) readonly buffer TexelAt { uint texel_at[]; };          // NO_TEXEL where there is none
@@ -16,10 +17,11 @@ layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { vec3 di
 layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { vec3 indirect_irradiance[]; };
 layout(set = 0, binding = 13, scalar) buffer Direct { vec3 direct[]; };
 layout(set = 0, binding = 14, scalar) buffer Indirect { vec3 indirect[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Texels { AtlasTexel texels[]; };
+layout(set = 0, binding = 16, scalar) readonly buffer DirectGloss { vec3 direct_gloss[]; };
+layout(set = 0, binding = 17, scalar) readonly buffer IndirectGloss { vec3 indirect_gloss[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
-layout(push_constant, scalar) uniform Params { vec4 eye; float weight; uint resolution; uint triangle_count; } params;
-
-const uint NO_TEXEL = 0xffffffffu;
+layout(push_constant, scalar) uniform Params { vec4 eye; float weight; uint resolution; uint triangle_count; uint has_gloss; } params;
 
 // Weights of the four texels around a place between the middle two: the uniform cubic B-spline.
 vec4 cubic_weights(float t)
@@ -53,7 +55,8 @@ void main()
     ivec2 first = ivec2(floor(from)) - 1;
     vec4 wx = cubic_weights(fract(from.x)), wy = cubic_weights(fract(from.y));
     vec3 direct_sum = vec3(0.0), indirect_sum = vec3(0.0);
-    float weight_sum = 0.0;
+    vec3 direct_shine = vec3(0.0), indirect_shine = vec3(0.0);
+    float weight_sum = 0.0, shine_sum = 0.0;
     for (int y = 0; y < 4; ++y) {
         for (int x = 0; x < 4; ++x) {
             ivec2 at = first + ivec2(x, y);
@@ -64,10 +67,17 @@ void main()
             direct_sum += weight * direct_irradiance[texel];
             indirect_sum += weight * indirect_irradiance[texel];
             weight_sum += weight;
+            if (params.has_gloss == 0 || !shows_towards(texels[texel], params.eye)) continue;
+            direct_shine += weight * direct_gloss[at.y * int(params.resolution) + at.x];
+            indirect_shine += weight * indirect_gloss[at.y * int(params.resolution) + at.x];
+            shine_sum += weight;
         }
     }
     if (weight_sum <= 0.0) return;
-    vec3 reflectance = params.weight / weight_sum * even_albedo(seen.surface, dot(seen.surface.normal, seen.to_eye)) / PI;
-    direct[index] += reflectance * direct_sum;
-    indirect[index] += reflectance * indirect_sum;
+    float cos_eye = dot(seen.surface.normal, seen.to_eye);
+    vec3 albedo = params.has_gloss != 0 ? diffuse_albedo(seen.surface, cos_eye) : even_albedo(seen.surface, cos_eye);
+    vec3 reflectance = params.weight / weight_sum * albedo / PI;
+    float shine = shine_sum > 0.0 ? params.weight / shine_sum : 0.0;
+    direct[index] += reflectance * direct_sum + shine * direct_shine;
+    indirect[index] += reflectance * indirect_sum + shine * indirect_shine;
 }

@@ -14,7 +14,7 @@ layout(location = 1) in vec2 in_uv1;
 layout(location = 2) in vec4 in_color;
 layout(location = 3) flat in uint in_triangle;
 
-vec4 sample_texture(uint index, vec2 uv) { return textureLod(textures[nonuniformEXT(index)], uv, 0.0); }
+vec4 sample_texture(TextureSlot slot, vec2 uv) { return textureLod(textures[nonuniformEXT(slot.texture)], uv, 0.0); }
 
 void main()
 {

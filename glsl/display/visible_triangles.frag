@@ -15,7 +15,7 @@ layout(location = 2) in vec4 in_color;
 layout(location = 3) flat in uint in_triangle;
 layout(location = 0) out uint out_triangle;
 
-vec4 sample_texture(uint index, vec2 uv) { return texture(textures[nonuniformEXT(index)], uv); }
+vec4 sample_texture(TextureSlot slot, vec2 uv) { return texture(textures[nonuniformEXT(slot.texture)], uv); }
 
 void main()
 {

@@ -27,10 +27,10 @@ layout(push_constant, scalar) uniform Params { uint element_count; } params;
 // Size of the sampled region in each UV set, as a fraction of the texture's width.
 vec2 region_uv;
 
-vec4 sample_texture(uint index, vec2 uv)
+vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(index)], 0).x);
-    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
 }
 
 float uv_extent(vec2 a, vec2 b, vec2 c)

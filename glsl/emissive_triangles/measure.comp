@@ -21,10 +21,10 @@ layout(push_constant, scalar) uniform Params { uint emitter_count; } params;
 // Extent of a sixteenth of the triangle, as a fraction of the texture's width.
 float region_uv;
 
-vec4 sample_texture(uint index, vec2 uv)
+vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = region_uv * float(textureSize(textures[nonuniformEXT(index)], 0).x);
-    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+    float texels = region_uv * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
 }
 
 float uv_extent(vec2 a, vec2 b, vec2 c)

@@ -11,6 +11,22 @@ struct AtlasTexel {
     uint is_back;
 };
 
+// "No texel" at a place of the atlas.
+const uint NO_TEXEL = 0xffffffffu;
+
+// How a texel shines, means over its parts.
+struct TexelGloss {
+    vec3 f0;            // specular reflectance at normal incidence
+    float f90;          // and at grazing incidence
+    float alpha;        // GGX roughness
+};
+
+// Whether the eye is on the texel's side. `eye`: its position and 1, or the direction to an orthographic one and 0.
+bool shows_towards(AtlasTexel texel, vec4 eye)
+{
+    return dot(texel.normal, eye.xyz - eye.w * texel.position) > 0.0;
+}
+
 // The part of one triangle in a texel.
 struct AtlasPart {
     uint triangle;

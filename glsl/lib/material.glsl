@@ -2,10 +2,10 @@
 #define LIB_MATERIAL
 // glTF metallic-roughness at a point: textures applied to factors.
 //
-// Bridge: the kernel defines how a texture is read (with derivatives in a fragment shader, level 0 elsewhere).
-vec4 sample_texture(uint texture_index, vec2 uv);
-
+// Bridge: the kernel defines how a texture is read, its place already found.
 #include "lib/scene.glsl"
+
+vec4 sample_texture(TextureSlot slot, vec2 uv);
 
 // A surface point as light transport sees it.
 struct Surface {
@@ -26,7 +26,7 @@ vec2 slot_uv(TextureSlot slot, VertexAttributes a)
 
 vec4 slot_value(TextureSlot slot, VertexAttributes a)
 {
-    return slot.texture == NO_TEXTURE ? vec4(1.0) : sample_texture(slot.texture, slot_uv(slot, a));
+    return slot.texture == NO_TEXTURE ? vec4(1.0) : sample_texture(slot, slot_uv(slot, a));
 }
 
 vec4 base_color_of(Material m, VertexAttributes a)

@@ -121,6 +121,35 @@ float rigid_visibility(SurfaceMapFrame frame, RigidPoint sender, RigidPoint rece
     return free;
 }
 
+// Pixels around a look-up from outside that must agree: half a step between directions moves the object's rim by so many.
+const float OUTSIDE_DOUBT = 5.0;
+
+// Whether all that the maps tell of the way from a sender to a receiver is beyond doubt: the four pixels around agree in
+// either's map, and so do the pixels and directions around in the maps from outside; `is_free` is what they say.
+bool rigid_is_sure(SurfaceMapFrame frame, RigidPoint sender, RigidPoint receiver, out bool is_free)
+{
+    RigidObject o = rigid_object(sender.object);
+    if (!surface_map_is_sure(frame, sender.place, sender.from, at_rest(o, receiver.position), direction_at_rest(o, receiver.normal), is_free)) return false;
+    if (is_free && receiver.object != sender.object) {
+        o = rigid_object(receiver.object);
+        if (!surface_map_is_sure(frame, receiver.place, receiver.from, at_rest(o, sender.position), direction_at_rest(o, sender.normal), is_free)) return false;
+    }
+    uint count = rigid_word(RIGID_COUNT);
+    for (uint k = 0; k < count && is_free; ++k) {
+        if (k == sender.object || k == receiver.object) continue;
+        o = rigid_object(k);
+        vec3 a = at_rest(o, sender.position), b = at_rest(o, receiver.position);
+        uint blocked = 0;
+        for (uint corner = 0; corner < 5; ++corner) {
+            vec2 side = corner < 4 ? vec2(corner & 1, corner >> 1) - 0.5 : vec2(0.0);
+            if (outside_blocks(k, o, a, b, vec4(OUTSIDE_DOUBT * side, side.y, -side.x))) ++blocked;
+        }
+        if (blocked != 0 && blocked != 5) return false;
+        is_free = blocked == 0;
+    }
+    return true;
+}
+
 // The texel's index under a point of a triangle, or NO_SENDER.
 uint rigid_texel(uint triangle, vec3 weights, bool is_back)
 {

@@ -28,20 +28,30 @@ Receiver receiver;
 float slack;            // how far rounding may have moved the receiver, metres
 float shown;            // what the pixel shows so far, as the display encodes it
 float shown_luminance;
+float least_change;     // luminance that would change what is shown by the threshold
+
+// The scaled luminance that is shown as white.
+float white_luminance()
+{
+    return options.operator == TONE_REINHARD ? options.white : options.operator == TONE_FILMIC ? 5.6 : 1.0;
+}
 
 // What the display shows of a luminance. Beyond its white, where it shows nothing more, shares count as they do below: the
 // picture may be shown darker later.
 float shown_value(float luminance)
 {
-    float x = options.scale * luminance;
-    float white = options.operator == TONE_REINHARD ? options.white : options.operator == TONE_FILMIC ? 5.6 : 1.0;
+    float x = options.scale * luminance, white = white_luminance();
     return display_value(x, options.operator, options.white) + (x > white ? log(x / white) / 2.4 : 0.0);
 }
 
+// The curve is inverted here, once for each light that was taken, so that the walk compares luminances.
 void start_showing(float luminance_so_far)
 {
     shown_luminance = luminance_so_far;
     shown = shown_value(luminance_so_far);
+    float value = shown + options.threshold;
+    float x = value < 1.0 ? luminance_shown_as(value, options.operator, options.white) : white_luminance() * exp(2.4 * (value - 1.0));
+    least_change = options.scale <= 0.0 ? 1e38 : options.threshold <= 0.0 ? 0.0 : max(x / options.scale - luminance_so_far, 0.0);
 }
 
 float luminance(vec3 color) { return dot(color, vec3(0.2126, 0.7152, 0.0722)); }
@@ -52,9 +62,7 @@ uint sender_decision(SenderNode node, bool is_leaf)
 {
     float bound = largest_radiance(node, receiver);
     if (bound <= 0.0) return SENDER_IGNORE;
-    if (is_leaf) return SENDER_TAKE;
-    float change = shown_value(shown_luminance + bound) - shown;
-    return change > options.threshold ? SENDER_REFINE : SENDER_TAKE;
+    return !is_leaf && bound > least_change ? SENDER_REFINE : SENDER_TAKE;
 }
 
 // One ray's worth of light: what the eye sees of it if nothing is in between.
@@ -73,6 +81,7 @@ bool is_worth_asking(inout Arrival arrival, float u)
 {
     vec3 light = arrival.direct + arrival.indirect;
     if (light + arrival.lost == vec3(0.0)) return false;
+    if (options.chance_below <= 0.0) return true;
     float change = shown_value(shown_luminance + luminance(light)) - shown;
     float full = options.chance_below * options.threshold;
     if (change >= full) return true;

@@ -11,9 +11,9 @@ layout(set = 0, binding = 5, scalar) readonly buffer Attributes        { VertexA
 layout(set = 0, binding = 6, scalar) readonly buffer Materials         { Material materials[]; };          // material_count
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 
-vec4 sample_texture(uint texture_index, vec2 uv)
+vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    return textureLod(textures[nonuniformEXT(texture_index)], uv, 0.0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, 0.0);
 }
 
 bool is_hole(uint triangle, vec2 barycentrics)

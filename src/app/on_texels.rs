@@ -6,9 +6,10 @@ use super::frame::{Gathering, check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
 use crate::display::direct::Canvas;
-use crate::display::final_gather::{FinalGather, Gathered};
+use crate::display::final_gather::{self, FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
-use crate::display::lightmap::{self, Lightmap, TexelLight};
+use crate::display::glossy_texels::GlossyTexels;
+use crate::display::lightmap::{self, Gloss, Lightmap, TexelLight};
 use crate::display::shadow_maps::ShadowMaps;
 use crate::gpu::Context;
 use crate::methods::pick::seen_triangle;
@@ -33,17 +34,25 @@ pub struct LightmapShown<'a> {
     pub shadow_maps: &'a ShadowMaps,
     pub g_buffer: &'a GBuffer,
     pub method: &'a SurfaceShadowMaps,
+    /// As the last frame left it.
+    pub gloss: Option<Gloss<'a>>,
 }
 
 enum Shown {
     FinalGather(Box<FinalGather>),
-    Lightmap(Box<Lightmap>),
+    Lightmap(Box<Lightmap>, Option<Box<GlossyTexels>>),
 }
 
 impl Shown {
     fn new(context: &Context, request: &RenderRequest, method: &SurfaceShadowMaps) -> Result<Self, AppError> {
         if request.display == Some(Display::Lightmap) {
-            return Ok(Self::Lightmap(Box::new(Lightmap::new(context, &method.atlas)?)));
+            let gathers = method.settings().glossy_bounce && !request.diffuse;
+            let gather = || {
+                let settings = final_gather::Settings { gather_visibility: Visibility::Auto, ..Default::default() };
+                GlossyTexels::new(context, &method.atlas, settings, request.tone, request.seed)
+            };
+            let gloss = gathers.then(gather).transpose()?.map(Box::new);
+            return Ok(Self::Lightmap(Box::new(Lightmap::new(context, &method.atlas)?), gloss));
         }
         let size = [request.width, request.height];
         let settings = request.final_gather_settings()?;
@@ -138,7 +147,10 @@ impl TexelsShown {
     pub fn lightmap(&self) -> Option<LightmapShown<'_>> {
         let Self { method, shadow_maps, g_buffer, shown } = self;
         match shown {
-            Shown::Lightmap(display) => Some(LightmapShown { display, shadow_maps, g_buffer, method }),
+            Shown::Lightmap(display, gloss) => {
+                let gloss = gloss.as_ref().map(|gloss| gloss.gloss());
+                Some(LightmapShown { display, shadow_maps, g_buffer, method, gloss })
+            }
             Shown::FinalGather(_) => None,
         }
     }
@@ -192,27 +204,30 @@ impl TexelsShown {
             irradiance.iter_mut().zip(indirect).for_each(|(sum, value)| *sum += value);
             write_exr(path, &lightmap::picture(&method.atlas, &irradiance)?)?;
         }
+        let gathered = Gathered {
+            world,
+            tree: &method.tree,
+            tracer: stage.tracer(),
+            maps: method.maps.as_ref(),
+            bvh: &stage.bvh,
+            shadow_maps: &self.shadow_maps,
+            g_buffer: &self.g_buffer,
+            view: &stage.view,
+        };
         match &self.shown {
-            Shown::FinalGather(display) => {
-                let gathered = Gathered {
-                    world,
-                    tree: &method.tree,
-                    tracer: stage.tracer(),
-                    maps: method.maps.as_ref(),
-                    bvh: &stage.bvh,
-                    shadow_maps: &self.shadow_maps,
-                    g_buffer: &self.g_buffer,
-                    view: &stage.view,
-                };
-                gather_samples(context, request, display, gathered, film, watch)
-            }
-            Shown::Lightmap(display) => {
+            Shown::FinalGather(display) => gather_samples(context, request, display, gathered, film, watch),
+            Shown::Lightmap(display, gloss) => {
                 let light = TexelLight {
                     direct_irradiance: method.direct_irradiance(),
                     indirect_irradiance: method.indirect_irradiance(),
+                    gloss: gloss.as_ref().map(|gloss| gloss.gloss()),
                 };
                 let mut recorder = context.recorder("frame")?;
                 recorder.scope("display", |recorder| {
+                    if let Some(gloss) = gloss {
+                        method.send_before_last(recorder);
+                        gloss.draw(recorder, &method.texels, gathered, request.spp);
+                    }
                     let (shadow_maps, g_buffer, view) = (&self.shadow_maps, &self.g_buffer, &stage.view);
                     let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
                     display.draw(recorder, light, canvas);

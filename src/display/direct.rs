@@ -1,8 +1,8 @@
 //! What every display stage starts from: the G-buffer, background, emission, and punctual light by shadow maps.
 
+use super::PixelView;
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
-use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display::{Direct, DirectParams};
 use crate::gpu::{Recorder, Sampled};
 use crate::scene::camera::View;
@@ -34,7 +34,7 @@ impl Canvas<'_> {
         let Self { world, shadow_maps, g_buffer, view, samples, film } = *self;
         let size = UVec2::new(film.width, film.height);
         for index in 0..samples {
-            let pixel_view = PixelView::new(view, size, sample_offset(index, samples));
+            let pixel_view = PixelView::new(view, size, index, samples);
             recorder.scope("sample", |recorder| {
                 let sample = Sample { index, samples, is_unlit };
                 draw(recorder, world, shadow_maps, g_buffer, &pixel_view, sample, film);

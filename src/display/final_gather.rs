@@ -9,10 +9,10 @@
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
+use super::PixelView;
 use super::direct::{self, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
-use super::{PixelView, sample_offset};
 use crate::gpu::shaders::display as passes;
 use crate::gpu::shaders::types::{GatherCount, KeptSender};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
@@ -187,14 +187,15 @@ impl FinalGather {
     /// Adds sample `sample` to `film`; the first clears it.
     pub fn draw(&self, recorder: &mut Recorder<'_>, from: Gathered<'_>, sample: Sample, film: &Film) {
         let size = UVec2::new(film.width, film.height);
-        let pixel_view = PixelView::new(from.view, size, sample_offset(sample.index, sample.samples));
+        let pixel_view = PixelView::new(from.view, size, sample.index, sample.samples);
         recorder.scope("sample", |recorder| {
             direct::draw(recorder, from.world, from.shadow_maps, from.g_buffer, &pixel_view, sample, film);
             self.gather(recorder, &from, &pixel_view, sample, film);
         });
     }
 
-    fn gather(
+    /// Adds what the surfaces of a G-buffer gather to `film`.
+    pub(super) fn gather(
         &self,
         recorder: &mut Recorder<'_>,
         from: &Gathered<'_>,

@@ -82,7 +82,11 @@ impl GBuffer {
                 g_specular: &self.specular,
                 g_emission: &self.emission,
                 textures: &world.textures,
-                params: GBufferParams { clip_from_world: view.clip_from_world.to_cols_array_2d(), eye: view.eye },
+                params: GBufferParams {
+                    clip_from_world: view.clip_from_world.to_cols_array_2d(),
+                    eye: view.eye,
+                    footprint: view.footprint,
+                },
             };
             recorder.dispatch(&resolve, [self.position.width, self.position.height]);
         });

@@ -6,10 +6,11 @@
 use super::PixelView;
 use super::direct::Canvas;
 use crate::gpu::shaders::display::{Lightmap as Pass, LightmapParams};
-use crate::gpu::shaders::types::TriangleCorners;
+use crate::gpu::shaders::types::{AtlasTexel, TriangleCorners};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::report::image::{Picture, PictureError};
 use crate::scene::atlas::{Atlas, NO_TEXEL};
+use crate::stages::texels;
 use glam::Vec3;
 
 /// Where things lie in the atlas.
@@ -19,6 +20,7 @@ pub struct Lightmap {
     corner_places: Buffer<TriangleCorners>,
     texel_at: Buffer<u32>,
     texel_charts: Buffer<u32>,
+    texels: Buffer<AtlasTexel>,
 }
 
 /// What a method offers per texel, W/m2; punctual lights are added per pixel.
@@ -28,6 +30,15 @@ pub struct TexelLight<'a> {
     pub direct_irradiance: &'a Buffer<Vec3>,
     /// Reflected at least once.
     pub indirect_irradiance: &'a Buffer<Vec3>,
+    /// What the texels send to the eye by their specular lobes; without it, these reflect as if light came evenly.
+    pub gloss: Option<Gloss<'a>>,
+}
+
+/// By place of the atlas, W m^-2 sr^-1 towards the eye.
+#[derive(Clone, Copy)]
+pub struct Gloss<'a> {
+    pub direct: &'a Buffer<Vec3>,
+    pub indirect: &'a Buffer<Vec3>,
 }
 
 impl Lightmap {
@@ -41,6 +52,7 @@ impl Lightmap {
             corner_places: context.upload("lightmap/corner places", &places)?,
             texel_at: context.upload("lightmap/texel at", &atlas.texel_at)?,
             texel_charts: context.upload("lightmap/texel charts", &charts)?,
+            texels: context.upload("lightmap/texels", &texels::receivers(atlas))?,
         })
     }
 
@@ -75,9 +87,13 @@ impl Lightmap {
             texel_charts: &self.texel_charts,
             direct_irradiance: light.direct_irradiance,
             indirect_irradiance: light.indirect_irradiance,
+            texels: &self.texels,
+            direct_gloss: light.gloss.map_or(light.direct_irradiance, |gloss| gloss.direct),
+            indirect_gloss: light.gloss.map_or(light.indirect_irradiance, |gloss| gloss.indirect),
             direct: &film.direct,
             indirect: &film.indirect,
             params: LightmapParams {
+                has_gloss: u32::from(light.gloss.is_some()),
                 eye: pixel_view.eye,
                 weight,
                 resolution: self.resolution,

@@ -8,6 +8,7 @@
 //! | [`vertex`] | the display stage that interpolates irradiance between vertices |
 //! | [`splat`] | the display stage that draws flat patches as rectangles that fade into one another |
 //! | [`lightmap`] | the display stage that filters the texels of an atlas |
+//! | [`glossy_texels`] | what texels of an atlas send to the eye by their specular lobe |
 //! | [`irradiance_vector`] | the display stage that shades by the vector irradiance of elements, per pixel or per vertex |
 //! | [`final_gather`] | the display stage that gathers from a sender tree at every pixel |
 //! | [`tone_map`] | what a display shows of a film |
@@ -19,6 +20,7 @@
 pub mod direct;
 pub mod final_gather;
 pub mod g_buffer;
+pub mod glossy_texels;
 pub mod interface;
 pub mod irradiance_vector;
 pub mod lightmap;
@@ -40,12 +42,14 @@ pub struct PixelView {
     pub forward: Vec3,
     /// The eye's place along `forward`, metres.
     pub eye_along: f32,
+    /// Side of the part of a pixel that is seen, pixels: what textures are filtered over.
+    pub footprint: f32,
 }
 
 impl PixelView {
-    /// `offset` in -0.5..0.5 pixels from the pixels' centres.
-    pub fn new(view: &View, size: UVec2, offset: Vec2) -> Self {
-        let shift = -2.0 * offset / size.as_vec2();
+    /// One of `samples` places in each pixel of a picture of `size`.
+    pub fn new(view: &View, size: UVec2, index: u32, samples: u32) -> Self {
+        let shift = -2.0 * sample_offset(index, samples) / size.as_vec2();
         let eye = match view.lens {
             Lens::Perspective { .. } => view.position.extend(1.0),
             Lens::Orthographic { .. } => (-view.forward).extend(0.0),
@@ -55,6 +59,7 @@ impl PixelView {
             eye: eye.to_array(),
             forward: view.forward,
             eye_along: view.position.dot(view.forward),
+            footprint: 1.0 / (samples.max(1) as f32).sqrt(),
         }
     }
 }

@@ -60,6 +60,8 @@ pub(super) struct Device {
     /// Value of the last submission known to be complete.
     pub completed: AtomicU64,
     pub open_recorders: AtomicU64,
+    /// Something was drawn on it.
+    pub has_drawn: AtomicBool,
     /// Made so far.
     pub allocations: AtomicU64,
     /// It was lost, or never finished: nothing more will come of it.
@@ -213,6 +215,7 @@ impl Device {
                 submitted: AtomicU64::new(0),
                 completed: AtomicU64::new(0),
                 open_recorders: AtomicU64::new(0),
+                has_drawn: AtomicBool::new(false),
                 allocations: AtomicU64::new(0),
                 is_lost: AtomicBool::new(false),
                 is_hung: AtomicBool::new(false),

@@ -202,6 +202,7 @@ impl<'c> Recorder<'c> {
             bytes_written: bytes(P::PROGRAM, &bindings, false) + target.size_bytes(),
         });
         let count = u64::from(vertices) * u64::from(instances);
+        self.context.device.has_drawn.store(true, Ordering::Relaxed);
         self.record(P::PROGRAM, &bindings, &attachments, cost, count, bound, |recorder| {
             let device = &recorder.context.device;
             let commands = recorder.commands();
@@ -383,6 +384,7 @@ impl<'c> Recorder<'c> {
         // SAFETY: the queries were reset on the host when the slot was taken; begin and end pair up.
         unsafe {
             device.raw.cmd_write_timestamp(commands, vk::PipelineStageFlags::TOP_OF_PIPE, timestamps, 2 * query);
+            self.take_timestamp();
             if let Some(statistics) = statistics {
                 device.raw.cmd_begin_query(commands, statistics, query, vk::QueryControlFlags::empty());
             }
@@ -401,9 +403,22 @@ impl<'c> Recorder<'c> {
         self.timed.push(Timed { path, name, cost, threads, overlapped, marker, is_compute });
     }
 
+    /// Drivers that draw on the CPU keep timestamps with what they have to draw, once they drew anything: the one before a
+    /// pass would be taken behind it. A barrier makes them draw first.
+    fn take_timestamp(&self) {
+        let device = &self.context.device;
+        if device.info.kind == "CPU" && device.has_drawn.load(Ordering::Relaxed) {
+            self.barrier_of_all();
+        }
+    }
+
     /// Makes all that was written before visible to all that comes after.
     pub(super) fn barrier(&self) {
         self.is_behind_barrier.set(true);
+        self.barrier_of_all();
+    }
+
+    fn barrier_of_all(&self) {
         let all = vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
             .src_access_mask(vk::AccessFlags2::MEMORY_WRITE)

@@ -3,7 +3,7 @@
 use super::trace::{self, Tracer};
 use super::world::World;
 use crate::gpu::shaders::atlas as passes;
-use crate::gpu::shaders::types::{AtlasPart, AtlasTexel, Ray, SenderLeaf};
+use crate::gpu::shaders::types::{AtlasPart, AtlasTexel, Ray, SenderLeaf, TexelGloss};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::scene::atlas::Atlas;
 use crate::stages::sender_tree::parallelogram;
@@ -20,11 +20,13 @@ pub struct Texels {
     pub albedo: Buffer<Vec3>,
     /// W m^-2 sr^-1.
     pub emission: Buffer<Vec3>,
-    /// glTF roughness, 0..1.
-    pub roughness: Buffer<f32>,
+    /// What leaves in all directions together, the specular lobe included, for each share of even light that arrives.
+    pub reflectance: Buffer<Vec3>,
+    /// The specular lobe.
+    pub gloss: Buffer<TexelGloss>,
     /// How far rays start off their surface, metres.
     pub ray_offset: f32,
-    parts: Buffer<AtlasPart>,
+    pub parts: Buffer<AtlasPart>,
     rays: Buffer<Ray>,
     is_free: Buffer<u32>,
 }
@@ -42,7 +44,8 @@ impl Texels {
             texels: context.upload("texels/texels", &receivers(atlas))?,
             albedo: context.buffer("texels/albedo", count)?,
             emission: context.buffer("texels/emission", count)?,
-            roughness: context.buffer("texels/roughness", count)?,
+            reflectance: context.buffer("texels/reflectance", count)?,
+            gloss: context.buffer("texels/gloss", count)?,
             ray_offset,
             parts: context.upload("texels/parts", &parts)?,
             rays: context.buffer("texels/rays", BATCH_RAYS as usize)?,
@@ -59,7 +62,7 @@ impl Texels {
         context.write(&self.texels, &receivers(atlas))
     }
 
-    /// Averages albedo, emission and roughness over the texels, with the world's present materials.
+    /// Averages what the texels reflect and emit over them, with the world's present materials.
     pub fn update_materials(&self, recorder: &mut Recorder<'_>, world: &World) {
         let pass = passes::Materials {
             texels: &self.texels,
@@ -71,7 +74,8 @@ impl Texels {
             positions: &world.positions,
             albedo: &self.albedo,
             emission: &self.emission,
-            roughness: &self.roughness,
+            reflectance: &self.reflectance,
+            gloss: &self.gloss,
             textures: &world.textures,
             params: passes::MaterialsParams { texel_count: self.count },
         };
@@ -150,7 +154,7 @@ impl Texels {
 }
 
 /// Texels as receivers, in the atlas' order.
-fn receivers(atlas: &Atlas) -> Vec<AtlasTexel> {
+pub fn receivers(atlas: &Atlas) -> Vec<AtlasTexel> {
     (atlas.texels.iter().enumerate())
         .map(|(index, texel)| AtlasTexel {
             position: texel.position,

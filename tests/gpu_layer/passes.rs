@@ -5,6 +5,7 @@ use crate::common::{Random, TestContext};
 use glam::Vec3;
 use linklight::gpu::shaders::display::{ShadowMap, ShadowMapParams};
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
+use linklight::gpu::shaders::yardstick::{MultiplyAdd, MultiplyAddParams};
 use linklight::gpu::{
     Context, Format, Image, ImageDescription, Load, OptionalFeatures, Options, RasterState, Shape, Target,
 };
@@ -53,6 +54,46 @@ fn depth_image(context: &Context) -> Image {
         shape: Shape::Array,
     };
     context.image(&description).unwrap()
+}
+
+/// A pass takes as long behind a draw as before any.
+#[test]
+fn a_pass_behind_a_draw_is_timed_whole() {
+    let context = TestContext::new();
+    let world = empty_world(&context);
+    let (shadow_views, depth) = (context.buffer("test/views", 1).unwrap(), depth_image(&context));
+    let draw = ShadowMap {
+        triangles: &world.triangles,
+        positions: &world.positions,
+        attributes: &world.attributes,
+        shadow_views: &shadow_views,
+        triangle_materials: &world.triangle_materials,
+        materials: &world.materials,
+        textures: &world.textures,
+        params: ShadowMapParams { view: 0 },
+    };
+    let values = context.upload("test/values", &[0.5f32; 1 << 16]).unwrap();
+    let work = MultiplyAdd { values: &values, params: MultiplyAddParams { count: 1 << 16, iterations: 100 } };
+    let state = RasterState { depth_test: true, ..RasterState::default() };
+    let shortest = |is_drawn: bool| {
+        let once = |_| {
+            let mut recorder = context.recorder("test").unwrap();
+            if is_drawn {
+                let target = Target { color: vec![], depth: Some((&depth, 0, Load::Clear([0.0; 4]))) };
+                recorder.draw(&draw, &target, state, 0, 1);
+            }
+            recorder.dispatch(&work, values.len());
+            context.take_records();
+            recorder.submit().unwrap();
+            let record = context.take_records().pop().unwrap();
+            assert_eq!(record.name, "yardstick/multiply_add");
+            record.end_ns - record.start_ns
+        };
+        (0..4).map(once).min().unwrap()
+    };
+    let [before, behind] = [false, true].map(shortest);
+    println!("before any draw {before} ns, behind one {behind} ns");
+    assert!(behind > before / 4 && before > behind / 4, "{before} ns and {behind} ns");
 }
 
 #[test]

@@ -244,7 +244,7 @@ impl Case {
         for sample in 0..samples {
             let offset = sample_offset(sample, samples);
             let mut recorder = context.recorder("test").unwrap();
-            g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, offset));
+            g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, sample, samples));
             recorder.submit().unwrap();
             self.vertex(&Surfaces::of(context, g_buffer), offset, 1.0 / samples as f32, &mut expected);
         }

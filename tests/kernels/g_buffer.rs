@@ -4,8 +4,8 @@ use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
 use glam::{DVec3, UVec2, Vec2, Vec3, Vec4};
-use linklight::display::PixelView;
 use linklight::display::g_buffer::GBuffer;
+use linklight::display::{PixelView, sample_offset};
 use linklight::gpu::Context;
 use linklight::scene::camera::{Lens, Ray, View};
 use linklight::scene::deform::{WorldVertices, world_vertices};
@@ -204,11 +204,15 @@ impl Caster<'_> {
 }
 
 fn on_device(context: &Context, scene: &Scene, geometry: &Geometry, view: &View, size: UVec2) -> Vec<Texel> {
+    sampled(context, scene, geometry, &PixelView::new(view, size, 0, 1), size)
+}
+
+fn sampled(context: &Context, scene: &Scene, geometry: &Geometry, view: &PixelView, size: UVec2) -> Vec<Texel> {
     let pose = Pose::rest(scene);
     let world = World::new(context, scene, geometry, &pose, &Environment::default(), false).unwrap();
     let g_buffer = GBuffer::new(context, size.x, size.y).unwrap();
     let mut recorder = context.recorder("test").unwrap();
-    g_buffer.draw(&mut recorder, &world, &PixelView::new(view, size, Vec2::ZERO));
+    g_buffer.draw(&mut recorder, &world, view);
     recorder.submit().unwrap();
     let image = |image| context.download_image::<[f32; 4]>(image, 0).unwrap().into_iter().map(Vec4::from);
     let triangles: Vec<u32> = context.download_image(&g_buffer.visible_triangles, 0).unwrap();
@@ -320,4 +324,60 @@ fn the_smallest_picture_is_one_pixel() {
     let (got, expected) = (on_device(&context, &scene, &geometry, &view, size), cast(&scene, &geometry, &view, size));
     assert_eq!((got[0].triangle, expected[0].triangle != 0), (expected[0].triangle, true));
     hold_texels("one pixel", &got, &expected);
+}
+
+/// Stripes along a floor that is seen at a grazing angle: a pixel is as narrow as a stripe, and many stripes long.
+#[test]
+fn textures_are_filtered_over_what_is_sampled_and_no_more() {
+    const STRIPES: usize = 32;
+    let context = TestContext::new();
+    let random = &mut Random(5);
+    let grey: Vec<f32> = (0..STRIPES).map(|_| (random.unit() * 255.0).round() / 255.0).collect();
+    let texel = |i: usize| [(grey[i % STRIPES] * 255.0) as u8; 3].into_iter().chain([255]);
+    let rgba = (0..STRIPES * STRIPES).flat_map(texel).collect();
+    let mut floor = parallelogram(Vec3::new(-2.0, 0.0, 0.0), Vec3::X * 4.0, Vec3::NEG_Z * 40.0, 1, 0);
+    floor.uv[0] = floor.positions.iter().map(|p| Vec2::new((p.x + 2.0) / 4.0, -p.z / 4.0)).collect();
+    let material = Material { base_color_texture: texture(0), ..lambert(Vec3::ONE) };
+    let mut scene = scene(vec![material], vec![floor], &[]);
+    let side = STRIPES as u32;
+    scene.images = vec![Image { name: "stripes".into(), width: side, height: side, rgba, srgb: false }];
+    let wrap = [Wrap::Repeat; 2];
+    scene.textures =
+        vec![Texture { image: 0, wrap, mag_linear: true, min_linear: true, mipmapped: true, mip_linear: true }];
+    let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+    let lens = Lens::Perspective { tan_half: Vec2::new(0.6, 0.4) };
+    let (view, size) = (look(Vec3::new(0.0, 0.4, 1.0), Vec3::new(0.0, 0.2, -3.0), lens), UVec2::new(64, 48));
+
+    // The stripe under a place of the picture; nothing beside the floor.
+    let stripe = |at: Vec2| -> Option<f32> {
+        let ray = view.ray(at, size);
+        let p = ray.origin - ray.origin.y / ray.direction.y * ray.direction;
+        let inside = ray.direction.y < 0.0 && p.x.abs() < 2.0 && (-40.0..0.0).contains(&p.z);
+        let u = (p.x + 2.0) / 4.0 * STRIPES as f32 - 0.5;
+        let of = |k: f32| grey[(k as i32).rem_euclid(STRIPES as i32) as usize];
+        inside.then(|| of(u.floor()) + (of(u.floor() + 1.0) - of(u.floor())) * (u - u.floor()))
+    };
+    // Of a square of the picture.
+    let mean = |middle: Vec2, width: f32| -> Option<f32> {
+        let at = |k: i32| middle + width * (Vec2::new((k % 12) as f32 + 0.5, (k / 12) as f32 + 0.5) / 12.0 - 0.5);
+        (0..144).map(|k| stripe(at(k))).sum::<Option<f32>>().map(|sum| sum / 144.0)
+    };
+    for samples in [1, 16] {
+        let width = 1.0 / (samples as f32).sqrt();
+        let offset = sample_offset(0, samples);
+        let got = sampled(&context, &scene, &geometry, &PixelView::new(&view, size, 0, samples), size);
+        let off = |width: f32| {
+            let pixel = |index: u32| {
+                let at = Vec2::new((index % size.x) as f32, (index / size.x) as f32) + 0.5 + offset;
+                let expected = mean(at, width).filter(|_| mean(at, 4.0).is_some())?;
+                Some((got[index as usize].albedo.x - expected).powi(2))
+            };
+            let squares: Vec<f32> = (0..size.x * size.y).filter_map(pixel).collect();
+            assert!(squares.len() > 800, "{} pixels see the floor alone", squares.len());
+            (squares.iter().sum::<f32>() / squares.len() as f32).sqrt()
+        };
+        let (own, wider) = (off(width), off(4.0 * width));
+        println!("{samples} samples: off by {own:.4} from what is sampled, {wider:.4} from four times as much");
+        assert!(own < 0.04 && wider > 2.0 * own, "{own} {wider}");
+    }
 }

@@ -8,7 +8,7 @@ use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
-use linklight::display::{PixelView, irradiance_vector, sample_offset};
+use linklight::display::{PixelView, irradiance_vector};
 use linklight::gpu::Context;
 use linklight::gpu::shaders::types::LeafElement;
 use linklight::scene::camera::Lens;
@@ -140,7 +140,7 @@ impl Lit {
         let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
         let mut recorder = context.recorder("test").unwrap();
         irradiance_vector::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples: 1, film });
-        g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, sample_offset(0, 1)));
+        g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, 0, 1));
         recorder.submit().unwrap();
         let surfaces = Surfaces::of(context, g_buffer);
         let [mut direct, indirect] = [&film.direct, &film.indirect].map(|of| context.download(of).unwrap());

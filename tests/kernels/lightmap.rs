@@ -4,11 +4,11 @@ use crate::common::{Random, TestContext};
 use crate::compare::{hold, tells_apart};
 use crate::display::{Case, RADIANCE, SIZE, Surfaces, case, even_albedo};
 use glam::{IVec2, UVec2, Vec2, Vec3};
+use linklight::display::PixelView;
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::lightmap::{Lightmap, TexelLight};
 use linklight::display::shadow_maps::ShadowMaps;
-use linklight::display::{PixelView, sample_offset};
 use linklight::scene::atlas::{Atlas, NO_TEXEL};
 use linklight::scene::camera::Lens;
 use linklight::scene::deform::world_vertices;
@@ -90,13 +90,14 @@ fn lightmap_agrees_with_its_twin() {
     let light = TexelLight {
         direct_irradiance: &context.upload("test/direct", &direct).unwrap(),
         indirect_irradiance: &context.upload("test/indirect", &indirect).unwrap(),
+        gloss: None,
     };
     let lightmap = Lightmap::new(&context, &atlas).unwrap();
     let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
     let mut recorder = context.recorder("test").unwrap();
     lightmap.draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples: 1, film });
     let size = UVec2::new(SIZE.x, SIZE.y);
-    g_buffer.draw(&mut recorder, world, &PixelView::new(view, size, sample_offset(0, 1)));
+    g_buffer.draw(&mut recorder, world, &PixelView::new(view, size, 0, 1));
     recorder.submit().unwrap();
 
     let surfaces = Surfaces::of(&context, g_buffer);

@@ -214,12 +214,16 @@ fn a_picture_of_moving_objects_is_that_of_rays() {
         fixture.show(&context, &method, settings, UVec2::new(64, 40))
     };
     let rays = show(Visibility::Rays);
-    let [maps, checked, none] = [Visibility::Maps, Visibility::Checked, Visibility::None].map(|by| show(by).off(&rays));
+    let shown = [Visibility::Maps, Visibility::Checked, Visibility::None].map(show);
+    let [maps, checked, none] = shown.each_ref().map(|shown| shown.off(&rays));
+    let share = shown[1].report.mean_rays / rays.report.mean_rays;
     println!(
-        "a picture by maps is off by {:.2} %, checked by {:.2} %, without shadows by {:.2} %",
+        "a picture by maps is off by {:.2} %, checked by {:.2} % with {:.0} % of the rays, without shadows by {:.2} %",
         100.0 * maps,
         100.0 * checked,
+        100.0 * share,
         100.0 * none
     );
-    assert!(maps < 0.05 && checked < 1.05 * maps && none > 2.0 * maps);
+    assert!(maps < 0.05 && none > 2.0 * maps && checked < 0.95 * maps);
+    assert!(share > 0.01 && share < 0.7, "{share} of the rays");
 }

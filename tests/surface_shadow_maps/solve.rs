@@ -25,6 +25,7 @@ const SMALL: Settings = Settings {
     chance: 0.0,
     light_samples: 8,
     environment_rays: 64,
+    glossy_bounce: true,
     tree_layout: linklight::stages::sender_tree::NodeLayout::Wide,
     tree_normal_weight: 0.25,
     keep_maps: false,

@@ -23,10 +23,10 @@ layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
 
 // A middling level: a cell sees many texels.
-vec4 sample_texture(uint index, vec2 uv)
+vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = 0.02 * float(textureSize(textures[nonuniformEXT(index)], 0).x);
-    return textureLod(textures[nonuniformEXT(index)], uv, log2(max(texels, 1.0)));
+    float texels = 0.02 * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
 }
 
 void main()

@@ -31,7 +31,7 @@ layout(constant_id = 5) const bool CLUSTERS_BLOCK = false;  // multiresolution v
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
-vec4 sample_texture(uint index, vec2 uv) { return textureLod(textures[nonuniformEXT(index)], uv, 0.0); }
+vec4 sample_texture(TextureSlot slot, vec2 uv) { return textureLod(textures[nonuniformEXT(slot.texture)], uv, 0.0); }
 
 // Places of the faces that block nothing: first and count of the receiver and of the shooter.
 uvec4 passed_places = uvec4(0);

@@ -31,7 +31,7 @@ layout(set = 0, binding = 15, scalar) writeonly buffer Vertices { PathVertex ver
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint path_count; uint is_last; LightChoice choice; } params;
 
-vec4 sample_texture(uint index, vec2 uv) { return textureLod(textures[nonuniformEXT(index)], uv, 0.0); }
+vec4 sample_texture(TextureSlot slot, vec2 uv) { return textureLod(textures[nonuniformEXT(slot.texture)], uv, 0.0); }
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
 EnvironmentCell environment_cell(uint index) { return environment_cells[index]; }
 

@@ -40,7 +40,7 @@ layout(push_constant, scalar) uniform Params {
     LightChoice choice;
 } params;
 
-vec4 sample_texture(uint index, vec2 uv) { return textureLod(textures[nonuniformEXT(index)], uv, 0.0); }
+vec4 sample_texture(TextureSlot slot, vec2 uv) { return textureLod(textures[nonuniformEXT(slot.texture)], uv, 0.0); }
 vec3 environment_texel(ivec2 texel) { return texelFetch(environment_map, texel, 0).rgb; }
 EnvironmentCell environment_cell(uint index) { return environment_cells[index]; }
 

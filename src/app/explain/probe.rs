@@ -5,8 +5,8 @@ use glam::{DVec3, UVec2, Vec3};
 use super::{Parts, add};
 use crate::app::AppError;
 use crate::app::stage::Stage;
+use crate::display::PixelView;
 use crate::display::direct::{self, Canvas, Sample};
-use crate::display::{PixelView, sample_offset};
 use crate::gpu::{Context, Recorder};
 use crate::report::explanation::Light;
 use crate::scene::LightKind;
@@ -59,7 +59,7 @@ impl<'a> Probe<'a> {
     pub fn sample(&self, index: u32, parts: &mut Parts) -> Result<Seen, AppError> {
         let Canvas { world, g_buffer, view, samples, film, .. } = self.canvas;
         let size = UVec2::new(film.width, film.height);
-        let view = PixelView::new(view, size, sample_offset(index, samples));
+        let view = PixelView::new(view, size, index, samples);
         let mut recorder = self.context.recorder("explain")?;
         g_buffer.draw(&mut recorder, world, &view);
         recorder.submit()?;

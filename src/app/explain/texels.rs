@@ -9,7 +9,7 @@ use super::{Frame, Parts, add};
 use crate::app::AppError;
 use crate::app::on_texels::{LightmapShown, TexelsShown};
 use crate::display::direct::Canvas;
-use crate::display::lightmap::TexelLight;
+use crate::display::lightmap::{Gloss, TexelLight};
 use crate::report::explanation::Light;
 use crate::scene::atlas::{Atlas, NO_TEXEL};
 use crate::stages::film::Film;
@@ -21,7 +21,7 @@ pub fn explain(
     parts: &mut Parts,
 ) -> Result<Vec<String>, AppError> {
     let Frame { context, request, stage, watch, .. } = frame;
-    let Some(LightmapShown { display, shadow_maps, g_buffer, method }) = shown.lightmap() else {
+    let Some(LightmapShown { display, shadow_maps, g_buffer, method, gloss }) = shown.lightmap() else {
         return Ok(Vec::new());
     };
     let scratch = Film::new(context, request.width, request.height)?;
@@ -29,7 +29,9 @@ pub fn explain(
     let canvas = Canvas { world, shadow_maps, g_buffer, view, samples, film: &scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     let ones = context.upload("explain/ones", &vec![Vec3::ONE; method.texels.count as usize])?;
-    let light = TexelLight { direct_irradiance: &ones, indirect_irradiance: &ones };
+    let zeros = context.upload("explain/zeros", &vec![Vec3::ZERO; method.atlas.texel_at.len()])?;
+    let unlit = gloss.map(|_| Gloss { direct: &zeros, indirect: &zeros });
+    let light = TexelLight { direct_irradiance: &ones, indirect_irradiance: &ones, gloss: unlit };
     let mut weights: BTreeMap<u32, DVec3> = BTreeMap::new();
     let mut names = Vec::new();
     for index in 0..samples {
@@ -44,6 +46,16 @@ pub fn explain(
                 .reflectance(&seen, |recorder, view, weight| display.add(recorder, light, canvas, view, weight))?;
             for (texel, share) in shares(&method.atlas, triangle, &seen) {
                 *weights.entry(texel).or_default() += f64::from(share) * reflectance;
+            }
+            for (kind, shine) in
+                gloss.iter().flat_map(|gloss| [(Light::Direct, gloss.direct), (Light::Indirect, gloss.indirect)])
+            {
+                let dark = TexelLight { direct_irradiance: &zeros, indirect_irradiance: &zeros, ..light };
+                let light = TexelLight { gloss: Some(Gloss { direct: &zeros, indirect: shine }), ..dark };
+                let shown = probe
+                    .reflectance(&seen, |recorder, view, weight| display.add(recorder, light, canvas, view, weight))?;
+                let key = (kind, None, "the glossy bounce of texels".to_owned(), "all that the lobes meet".to_owned());
+                add(parts, key, shown);
             }
         }
     }

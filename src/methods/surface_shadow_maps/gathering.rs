@@ -21,7 +21,7 @@ impl SurfaceShadowMaps {
                 let pass = passes::$pass {
                     $($field: $value,)*
                     texels: &texels.texels,
-                    albedo: &texels.albedo,
+                    albedo: &texels.reflectance,
                     sender_nodes: nodes,
                     sender_light: &tree.light,
                     sender_leaves: &tree.leaves,

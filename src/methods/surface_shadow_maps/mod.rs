@@ -19,7 +19,8 @@
 //!
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
-//! direct light of emissive texels comes by the same walk.
+//! direct light of emissive texels comes by the same walk; between texels, what surfaces reflect by their specular lobe
+//! leaves evenly too (there it is lost: senders are diffuse).
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
@@ -91,6 +92,9 @@ crate::settings! {
         light_samples: u32 = 8, range 1..=1024, unit "points", paper "shadow maps";
         /// Rays of each texel to the environment.
         environment_rays: u32 = 128, range 1..=65536, unit "rays", paper "not given";
+        /// Shown by the lightmap, texels that shine gather a bounce of their own towards the eye; else they reflect as if light
+        /// came evenly from all sides.
+        glossy_bounce: bool = true, paper "Fig. 17";
         /// How nodes of the tree lie in memory.
         tree_layout: NodeLayout = NodeLayout::Wide, paper "compact";
         /// How much a difference of normals counts beside distance when the tree is cut.
@@ -180,6 +184,8 @@ struct State {
     irradiance: Buffer<Vec3>,
     reflected: Buffer<Vec3>,
     reflected_sum: Buffer<Vec3>,
+    /// Of the sum, what left before the last bounce.
+    sent_before: Buffer<Vec3>,
     /// From emitters and the environment.
     direct: Buffer<Vec3>,
     indirect: Buffer<Vec3>,
@@ -254,7 +260,7 @@ impl SurfaceShadowMaps {
     pub fn solve(&self, recorder: &mut Recorder<'_>, lit: Lit<'_>, bounces: u32) {
         let Lit { world, tracer, .. } = lit;
         let (texels, s) = (&self.texels, &self.state);
-        for sum in [&s.reflected_sum, &s.indirect, &s.dark] {
+        for sum in [&s.reflected_sum, &s.sent_before, &s.indirect, &s.dark] {
             recorder.fill(sum, 0);
         }
         let pass = passes::Emit {
@@ -274,11 +280,17 @@ impl SurfaceShadowMaps {
         for bounce in 1..=bounces {
             recorder.scope(format_args!("bounce {bounce}"), |recorder| {
                 self.tree.pull(recorder, &s.dark, &s.reflected);
+                recorder.copy(&s.reflected_sum, &s.sent_before);
                 self.gather(recorder, &lit, bounce);
                 self.reflect(recorder, true);
             });
         }
         self.tree.pull(recorder, &s.emitted, &s.reflected_sum);
+    }
+
+    /// Fills the tree with what the texels' own irradiance came from: for a last bounce of theirs towards the eye.
+    pub fn send_before_last(&self, recorder: &mut Recorder<'_>) {
+        self.tree.pull(recorder, &self.state.emitted, &self.state.sent_before);
     }
 
     /// Fills the tree with what emits alone: what is shown without bounces.
@@ -291,7 +303,7 @@ impl SurfaceShadowMaps {
         let s = &self.state;
         let pass = passes::Reflect {
             irradiance: &s.irradiance,
-            albedo: &self.texels.albedo,
+            albedo: &self.texels.reflectance,
             reflected: &s.reflected,
             reflected_sum: &s.reflected_sum,
             indirect: &s.indirect,
@@ -412,6 +424,7 @@ impl State {
             irradiance: light("irradiance")?,
             reflected: light("reflected")?,
             reflected_sum: light("reflected sum")?,
+            sent_before: light("sent before")?,
             direct: light("direct")?,
             indirect: light("indirect")?,
             cut_sizes: context.buffer("surface_shadow_maps/cut sizes", count)?,
