@@ -2,12 +2,11 @@
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
 #include "lib/atlas.glsl"
-#include "lib/specular_albedo.glsl"
+#include "lib/material.glsl"
 
 // One thread per texel: means over its parts of what it reflects and emits.                      [Ritschel2008 4.1]
 // reads texels, parts, triangles, triangle_materials, attributes, materials, textures
-// writes albedo (1), reflectance (1: the specular lobe's too, in the mean over all directions), emission (W m^-2 sr^-1),
-//        gloss [texel_count]   shared none
+// writes albedo (1), emission (W m^-2 sr^-1), gloss [texel_count]   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Texels { AtlasTexel texels[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Parts { AtlasPart parts[]; };
@@ -18,8 +17,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer Materials { Material materi
 layout(set = 0, binding = 6, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Albedo { vec3 albedo[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Emission { vec3 emission[]; };
-layout(set = 0, binding = 9, scalar) writeonly buffer Reflectance { vec3 reflectance[]; };
-layout(set = 0, binding = 10, scalar) writeonly buffer Gloss { TexelGloss gloss[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Gloss { TexelGloss gloss[]; };
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint texel_count; } params;
 
@@ -38,21 +36,13 @@ float uv_area(vec2 a, vec2 b, vec2 c)
     return 0.5 * abs(ab.x * ac.y - ab.y * ac.x);
 }
 
-// Of even light, what leaves in all directions together: the mean over cosines squared, evenly spread.
-vec3 sent_albedo(Surface s)
-{
-    vec3 sum = vec3(0.0);
-    for (uint k = 0; k < 4; ++k) sum += even_albedo(s, sqrt((float(k) + 0.5) / 4.0));
-    return sum / 4.0;
-}
-
 void main()
 {
     uint i = linear_index();
     if (i >= params.texel_count) return;
 
     AtlasTexel texel = texels[i];
-    vec3 albedo_sum = vec3(0.0), emission_sum = vec3(0.0), reflectance_sum = vec3(0.0), f0_sum = vec3(0.0);
+    vec3 albedo_sum = vec3(0.0), emission_sum = vec3(0.0), f0_sum = vec3(0.0);
     float f90_sum = 0.0, alpha_sum = 0.0, area_sum = 0.0;
     for (uint k = texel.first_part; k < texel.first_part + texel.part_count; ++k) {
         AtlasPart part = parts[k];
@@ -70,7 +60,6 @@ void main()
         emission_sum += part.area * s.emission;
         if (s.reflects) {
             albedo_sum += part.area * s.albedo;
-            reflectance_sum += part.area * sent_albedo(s);
             f0_sum += part.area * s.f0;
             f90_sum += part.area * s.f90;
         }
@@ -80,6 +69,5 @@ void main()
     float inverse = area_sum > 0.0 ? 1.0 / area_sum : 0.0;
     albedo[i] = albedo_sum * inverse;
     emission[i] = emission_sum * inverse;
-    reflectance[i] = reflectance_sum * inverse;
     gloss[i] = TexelGloss(f0_sum * inverse, f90_sum * inverse, alpha_sum * inverse);
 }

@@ -20,8 +20,6 @@ pub struct Texels {
     pub albedo: Buffer<Vec3>,
     /// W m^-2 sr^-1.
     pub emission: Buffer<Vec3>,
-    /// What leaves in all directions together, the specular lobe included, for each share of even light that arrives.
-    pub reflectance: Buffer<Vec3>,
     /// The specular lobe.
     pub gloss: Buffer<TexelGloss>,
     /// How far rays start off their surface, metres.
@@ -44,7 +42,6 @@ impl Texels {
             texels: context.upload("texels/texels", &receivers(atlas))?,
             albedo: context.buffer("texels/albedo", count)?,
             emission: context.buffer("texels/emission", count)?,
-            reflectance: context.buffer("texels/reflectance", count)?,
             gloss: context.buffer("texels/gloss", count)?,
             ray_offset,
             parts: context.upload("texels/parts", &parts)?,
@@ -74,7 +71,6 @@ impl Texels {
             positions: &world.positions,
             albedo: &self.albedo,
             emission: &self.emission,
-            reflectance: &self.reflectance,
             gloss: &self.gloss,
             textures: &world.textures,
             params: passes::MaterialsParams { texel_count: self.count },

@@ -21,7 +21,7 @@ impl SurfaceShadowMaps {
                 let pass = passes::$pass {
                     $($field: $value,)*
                     texels: &texels.texels,
-                    albedo: &texels.reflectance,
+                    albedo: &texels.albedo,
                     sender_nodes: nodes,
                     sender_light: &tree.light,
                     sender_leaves: &tree.leaves,

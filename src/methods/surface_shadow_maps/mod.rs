@@ -19,8 +19,7 @@
 //!
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
-//! direct light of emissive texels comes by the same walk; between texels, what surfaces reflect by their specular lobe
-//! leaves evenly too (there it is lost: senders are diffuse).
+//! direct light of emissive texels comes by the same walk.
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
@@ -303,7 +302,7 @@ impl SurfaceShadowMaps {
         let s = &self.state;
         let pass = passes::Reflect {
             irradiance: &s.irradiance,
-            albedo: &self.texels.reflectance,
+            albedo: &self.texels.albedo,
             reflected: &s.reflected,
             reflected_sum: &s.reflected_sum,
             indirect: &s.indirect,
