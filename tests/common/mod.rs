@@ -13,6 +13,12 @@ const ON_PURPOSE: [(&str, &str); 1] = [(
     "LocalSizeId is an optional feature (maintenance4) that we do not ask for",
 )];
 
+/// With this in the environment, all tests run as on a device of the least limits and without optional features.
+const SMALL_DEVICE: &str = "LINKLIGHT_TEST_SMALL_DEVICE";
+
+/// Bytes a pass can bind there.
+const SMALL_STORAGE_BUFFER: u64 = 16 << 20;
+
 /// A context with core, synchronization and best-practices validation; dropping it fails the test if any said anything
 /// that is not [`ON_PURPOSE`].
 pub struct TestContext(Context);
@@ -23,7 +29,11 @@ impl TestContext {
     }
 
     pub fn with(options: Options) -> Self {
-        let options = Options { validation: true, best_practices: true, ..options };
+        let mut options = Options { validation: true, best_practices: true, ..options };
+        if std::env::var_os(SMALL_DEVICE).is_some() {
+            options.no_optional_features = true;
+            options.max_storage_buffer_bytes.get_or_insert(SMALL_STORAGE_BUFFER);
+        }
         Self(
             Context::new(options)
                 .unwrap_or_else(|e| panic!("GPU tests need a Vulkan device and the validation layer: {e}")),
