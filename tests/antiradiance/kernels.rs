@@ -1,12 +1,14 @@
 //! The passes against their twins, on the states of small scenes.
 
 use crate::common::TestContext;
+use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{by_node, entries, prepare, settings};
 use crate::twins::{self, Transferring};
 use glam::{DVec3, Vec3};
 use linklight::gpu::Options;
 use linklight::methods::antiradiance::{LocalStep, Settings, link_solid_angle};
+use linklight::scene::{LightKind, Scene};
 use linklight::stages::direction_bins::Spread;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -79,14 +81,24 @@ fn links_and_transfers_agree_with_their_twins() {
     }
 }
 
+/// Two boards that stand side by side over a floor, each of its own colour on both sides.
+fn boards() -> Scene {
+    let floor = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 6, 0);
+    let board = |x, material| parallelogram(Vec3::new(x, 0.1, 0.0), Vec3::X, Vec3::new(0.0, 1.0, 0.3), 3, material);
+    let lamps = [-1.5, 1.5].map(|z| (light(LightKind::Point, 5.0), Vec3::new(0.0, 1.5, z), Vec3::NEG_Y));
+    let colors = [Vec3::splat(0.7), Vec3::new(0.8, 0.1, 0.1), Vec3::new(0.1, 0.1, 0.8)];
+    scene(colors.map(lambert).to_vec(), vec![floor, board(-1.2, 1), board(0.2, 2)], &lamps)
+}
+
 #[test]
 fn a_step_agrees_with_its_twin() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
-    for undershoot in [0.25, 1e9] {
-        let mut method = prepare(&context, &fixture, Settings { undershoot, ..settings(128) });
+    let cornell_box = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
+    let boards = Fixture::new(&context, boards(), None);
+    for (fixture, undershoot) in [(&cornell_box, 0.25), (&cornell_box, 1e9), (&boards, 0.25)] {
+        let mut method = prepare(&context, fixture, Settings { undershoot, ..settings(128) });
         // Some steps, so that light and antiradiance of several kinds are there.
-        crate::support::solve(&context, &mut method, &fixture, 2);
+        crate::support::solve(&context, &mut method, fixture, 2);
         let (hierarchy, bins, tables) = (method.hierarchy(), method.bins(), method.tables());
         let nodes = context.download(&hierarchy.nodes).unwrap();
         let leaves = context.download(&hierarchy.leaves).unwrap();
