@@ -84,7 +84,7 @@ impl Fixture {
     }
 }
 
-/// A leaf element with the irradiance of its mean normal, W/m2.
+/// A leaf element with the irradiance of its mean normal, W/m2, mean over its faces.
 pub struct Leaf {
     pub index: u32,
     pub element: FaceElement,
@@ -97,6 +97,7 @@ pub fn leaves(context: &TestContext, method: &FaceClusters) -> Vec<Leaf> {
     let count = method.report().elements as usize;
     let state = method.state();
     let functions = state.direct().len() / state.elements.len();
+    let means = context.download_range(state.function_means(), 0..count * functions).unwrap();
     let elements = context.download_range(&state.elements, 0..count).unwrap();
     let direct = context.download_range(state.direct(), 0..count * functions).unwrap();
     let indirect = context.download_range(state.indirect(), 0..count * functions).unwrap();
@@ -104,7 +105,11 @@ pub fn leaves(context: &TestContext, method: &FaceClusters) -> Vec<Leaf> {
     for (i, element) in elements.into_iter().enumerate() {
         if element.children == u32::MAX {
             let normal = element.axis_z * ((element.facing[4] - element.facing[5]) / element.area.max(1e-30));
-            let along = |of: &[[[f32; 3]; 3]]| Mat3::from_cols_array_2d(&of[i * functions]).transpose() * normal;
+            let along = |of: &[[[f32; 3]; 3]]| -> Vec3 {
+                let own = i * functions..(i + 1) * functions;
+                let values = of[own.clone()].iter().zip(&means[own]);
+                values.map(|(v, &mean)| mean * (Mat3::from_cols_array_2d(v).transpose() * normal)).sum()
+            };
             leaves.push(Leaf {
                 index: leaves.len() as u32,
                 direct: along(&direct),

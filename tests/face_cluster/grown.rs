@@ -9,7 +9,7 @@ use linklight::gpu::Buffer;
 use linklight::gpu::shaders::types::{FaceElement, PairCounters, PoolCounters};
 use linklight::methods::face_cluster::rules::Rule;
 use linklight::methods::face_cluster::{FaceClusters, Placement, Settings};
-use linklight::scene::LightKind;
+use linklight::scene::{LightKind, Primitive};
 
 pub const RECEIVER: Rule = Rule::Seven;
 pub const SHOOTER: Rule = Rule::Six;
@@ -24,15 +24,26 @@ pub struct Grown {
     pub tables: Tables,
     pub elements: Vec<FaceElement>,
     pub nodes: Vec<Vec<Vec3>>,
+    /// Per element and node: it is no matter of rounding.
+    pub is_clear: Vec<Vec<bool>>,
+    /// Per element, function and receiver node.
+    pub fits: Vec<f32>,
+    /// Per element and function.
+    pub means: Vec<f32>,
 }
 
-/// A floor, a wavy sheet with two sides above it, a board between them, and two lamps.
+/// A floor, a wavy sheet with two sides above it, a board between them, a closed post that stands in the floor, and two
+/// lamps.
 pub fn grown(count: usize) -> Grown {
-    grown_over(count, [0.2, 3.0])
+    grown_in(count, [0.2, 3.0], Some(closed_box(Vec3::new(-0.8, -0.1, -0.7), Vec3::new(-0.35, 0.3, 0.1), 4, 0)))
 }
 
-/// With waves so high and so many radians a metre.
-pub fn grown_over(count: usize, [height, waves]: [f32; 2]) -> Grown {
+/// With waves so high and so many radians a metre, and without the post.
+pub fn grown_over(count: usize, waves: [f32; 2]) -> Grown {
+    grown_in(count, waves, None)
+}
+
+fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) -> Grown {
     let context = TestContext::new();
     let mut sheet = parallelogram(Vec3::new(-1.0, 1.2, 1.0), Vec3::X * 2.0, Vec3::NEG_Z * 2.0, 10, 1);
     sheet.positions.iter_mut().for_each(|p| p.y += height * (waves * p.x).sin() * (2.0 * p.z).cos());
@@ -46,12 +57,14 @@ pub fn grown_over(count: usize, [height, waves]: [f32; 2]) -> Grown {
         (light(LightKind::Point, 3.0), Vec3::new(0.2, 0.7, -0.1), Vec3::NEG_Y),
         (light(LightKind::Directional, 2.0), Vec3::ZERO, Vec3::new(0.3, -1.0, 0.2)),
     ];
-    let fixture = Fixture::new(&context, scene(materials, vec![floor, sheet, board], &lamps), None);
+    let fixture =
+        Fixture::new(&context, scene(materials, [floor, sheet, board].into_iter().chain(post).collect(), &lamps), None);
     let settings = Settings { receiver_rule: RECEIVER, shooter_rule: SHOOTER, ..Settings::default() };
     let method = FaceClusters::prepare(&context, &fixture.stage(), settings).unwrap();
     let p: &Placement = method.placement();
-    let mut rules = RECEIVER.nodes();
-    rules.extend(SHOOTER.nodes());
+    let rules = [RECEIVER.nodes(), SHOOTER.nodes(), RECEIVER.triangle_nodes(), SHOOTER.triangle_nodes()].concat();
+    let solids = context.download(&p.solids).unwrap();
+    let [low, high] = fixture.bounds;
     let tables = Tables {
         clusters: context.download(&p.clusters).unwrap(),
         skips: context.download(&p.skips).unwrap(),
@@ -62,6 +75,8 @@ pub fn grown_over(count: usize, [height, waves]: [f32; 2]) -> Grown {
         positions: fixture.positions.clone(),
         rules,
         receiver_nodes: RECEIVER.nodes().len(),
+        is_solid: (0..fixture.geometry.triangles.len()).map(|t| solids[t / 32] >> (t % 32) & 1 != 0).collect(),
+        ray_offset: 1e-5 * (high - low).length(),
     };
     let roots = tables.instances.len() as u32;
     let mut elements: Vec<FaceElement> =
@@ -76,8 +91,36 @@ pub fn grown_over(count: usize, [height, waves]: [f32; 2]) -> Grown {
             elements.push(twins::element(&tables, parent.instance, cluster, widest as u32, parent.level + 1));
         }
     }
-    let nodes = elements.iter().map(|e| twins::nodes(&tables, e)).collect();
-    Grown { context, fixture, method, tables, elements, nodes }
+    let laid: Vec<twins::Nodes> = elements.iter().map(|e| twins::nodes(&tables, e)).collect();
+    elements.iter_mut().zip(&laid).for_each(|(e, laid)| *e = twins::exposed(*e, laid.share));
+    let (mut fits, mut means) = (Vec::new(), Vec::new());
+    for (e, laid) in elements.iter().zip(&laid) {
+        let (rows, of_functions) = twins::fit(&tables, e, &laid.places, FUNCTIONS);
+        fits.extend(rows.iter().flatten().map(|&v| v as f32));
+        means.extend(of_functions.iter().map(|&v| v as f32));
+    }
+    let is_clear = laid.iter().map(|laid| laid.is_clear.clone()).collect();
+    let nodes = laid.into_iter().map(|laid| laid.places).collect();
+    Grown { context, fixture, method, tables, elements, nodes, is_clear, fits, means }
+}
+
+/// Six sides of `cells` x `cells` squares, welded, wound outwards.
+fn closed_box(low: Vec3, high: Vec3, cells: u32, material: u32) -> Primitive {
+    let size = high - low;
+    let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
+    let sides = [(low, z, y), (low + x, y, z), (low, x, z), (low + y, z, x), (low, y, x), (low + z, x, y)];
+    let mut all = parallelogram(low, z, y, cells, material);
+    for (corner, u, v) in &sides[1..] {
+        let side = parallelogram(*corner, *u, *v, cells, material);
+        let first = all.positions.len() as u32;
+        all.triangles.extend(side.triangles.iter().map(|t| t.map(|v| v + first)));
+        all.positions.extend(side.positions);
+        all.normals.extend(side.normals);
+        all.tangents.extend(side.tangents);
+        all.colors.extend(side.colors);
+        all.uv.iter_mut().zip(side.uv).for_each(|(all, side)| all.extend(side));
+    }
+    all
 }
 
 impl Grown {

@@ -1,6 +1,6 @@
 //! Twins of what decides pairs: visibility, transport, bounds and splits.
 
-use crate::twins::{Tables, Vectors, basis, count, frame, turn, vector_area};
+use crate::twins::{Tables, Vectors, basis, count, fit, frame, node_coordinates, turn, vector_area};
 use glam::{DVec3, Vec3};
 use linklight::gpu::shaders::types::{ClusterInstance, FaceElement, Light};
 use std::f64::consts::PI;
@@ -214,7 +214,7 @@ impl Reaching {
     /// Takes away what is blocked, and decides; `split` where the error is too large.
     fn decided(
         mut self,
-        t: &Tables,
+        (t, nodes): (&Tables, &[Vec3]),
         (a, shooter): (&FaceElement, Option<&FaceElement>),
         way: &Way,
         free: impl Fn(usize) -> f64,
@@ -243,11 +243,10 @@ impl Reaching {
             self.least[r] *= f64::from(u8::from(share >= 0.999));
             self.greatest[r] *= f64::from(u8::from(share > 0.0));
         }
-        let place = |r: usize| t.rules[r].uv.as_dvec2();
-        let on = |k: usize, c: usize| -> DVec3 {
-            let at = |r: usize| f64::from(t.rules[r].weight) * basis(k, place(r)) * self.at_nodes[r][c];
-            (0..t.receiver_nodes).map(at).sum()
-        };
+        let place = |r: usize| node_coordinates(t, a, nodes, r);
+        let (fits, _) = fit(t, a, nodes, way.functions);
+        let on =
+            |k: usize, c: usize| -> DVec3 { (0..t.receiver_nodes).map(|r| fits[k][r] * self.at_nodes[r][c]).sum() };
         let arrives: Vec<Vectors> = (0..way.functions).map(|k| [0, 1, 2].map(|c| on(k, c))).collect();
         if !is_small && split != DONE {
             let said = |r: usize| -> f64 {
@@ -295,11 +294,11 @@ pub fn transport(
     if !may_face(a, b) || !may_face(b, a) {
         return Outcome::new(DONE, vec![]);
     }
-    let shooter_rule = &t.rules[t.receiver_nodes..];
-    let sent: Vec<DVec3> = shooter_rule
-        .iter()
-        .map(|rule| {
-            let value = |(k, v): (usize, &Vec3)| basis(k, rule.uv.as_dvec2()) * v.as_dvec3();
+    let shooter_rule = &t.rules_of(b)[t.receiver_nodes..];
+    let sent: Vec<DVec3> = (0..shooter_rule.len())
+        .map(|e| {
+            let uv = node_coordinates(t, b, &nodes[shooter], t.receiver_nodes + e);
+            let value = |(k, v): (usize, &Vec3)| basis(k, uv) * v.as_dvec3();
             unshot[shooter].iter().enumerate().map(value).sum::<DVec3>().max(DVec3::ZERO)
         })
         .collect();
@@ -356,7 +355,8 @@ pub fn transport(
         (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
-    let mut outcome = reaching.decided(t, (a, Some(b)), way, free, (split, turn % t.receiver_nodes));
+    let mut outcome =
+        reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, (split, turn % t.receiver_nodes));
     // Level with the receiver's plane single precision may take another node for a ray.
     let (from, to) = (&nodes[receiver][..t.receiver_nodes], &nodes[shooter][t.receiver_nodes..]);
     let is_level = |x: &Vec3, y: &Vec3| (*y - *x).dot(a.axis_z).abs() < 1e-5 * (*y - *x).length();
@@ -408,5 +408,5 @@ pub fn transport_light(
         visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
     };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
-    reaching.decided(t, (a, None), way, free, (split, a.cluster as usize % t.receiver_nodes))
+    reaching.decided((t, nodes), (a, None), way, free, (split, a.cluster as usize % t.receiver_nodes))
 }

@@ -18,9 +18,13 @@ pub struct Tables {
     pub places: Vec<u32>,
     pub triangles: Vec<[u32; 3]>,
     pub positions: Vec<Vec3>,
-    /// Of the receiver, then of the shooter.
+    /// Of the receiver, then of the shooter; on the square, then on a triangle.
     pub rules: Vec<CubatureNode>,
     pub receiver_nodes: usize,
+    /// Per triangle: of a closed body.
+    pub is_solid: Vec<bool>,
+    /// Rays start so far off a surface, metres.
+    pub ray_offset: f32,
 }
 
 impl Tables {
@@ -31,6 +35,12 @@ impl Tables {
 
     pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|v| self.positions[v as usize].as_dvec3())
+    }
+
+    /// Of the element's own kind: receiver's, then shooter's.
+    pub fn rules_of(&self, e: &FaceElement) -> &[CubatureNode] {
+        let half = self.rules.len() / 2;
+        if e.place_count == 1 { &self.rules[half..] } else { &self.rules[..half] }
     }
 
     pub fn triangle_at(&self, instance: &ClusterInstance, place: u32) -> u32 {
@@ -114,43 +124,147 @@ pub fn nearest(p: DVec3, corners: [DVec3; 3]) -> DVec3 {
     sides.map(on_side).into_iter().min_by(|x, y| x.distance(p).total_cmp(&y.distance(p))).unwrap()
 }
 
-/// Where each cubature node of an element may lie: on the nearest of its faces, found by the nearer box at every level.
-/// Where two boxes are as near, single precision takes either.
-pub fn places_of_nodes(t: &Tables, e: &FaceElement) -> Vec<Vec<Vec3>> {
-    let inst = &t.instances[e.instance as usize];
-    let (linear, at) = frame(inst);
-    let laid = |rule: &CubatureNode| {
-        let point = plane_point(e, rule.uv.as_dvec2());
-        let q = linear.inverse() * (point - at);
-        let in_box = |k: u32| {
-            let (c, h) = (&t.clusters[k as usize], t.clusters[k as usize].half_extent.as_dvec3());
-            c.center.as_dvec3() + turn(c) * (turn(c).inverse() * (q - c.center.as_dvec3())).clamp(-h, h)
-        };
-        let (mut places, mut stack) = (Vec::new(), vec![e.cluster]);
-        while let Some(cluster) = stack.pop() {
-            if let Some([left, right]) = t.children(cluster) {
-                let (to_left, to_right) = (in_box(left).distance(q), in_box(right).distance(q));
-                let slack = 1e-5;
-                stack.extend((to_right <= to_left + slack).then_some(right));
-                stack.extend((to_left <= to_right + slack).then_some(left));
-                continue;
-            }
-            let c = &t.clusters[cluster as usize];
-            places.push(if count(c) > 1 {
-                (linear * in_box(cluster) + at).as_vec3()
-            } else {
-                let corners = t.corners(t.triangle_at(inst, c.first_face));
-                nearest(point, corners).lerp(corners.iter().sum::<DVec3>() / 3.0, 0.05).as_vec3()
-            });
+/// Places looked at for a node.
+const TRIES: usize = 8;
+
+/// Whether some closed body holds what is just off `place`, along a slanted `normal`: by all triangles.
+fn is_hidden(t: &Tables, place: DVec3, normal: DVec3) -> bool {
+    let aside = if normal.x.abs() < 0.5 { DVec3::X } else { DVec3::Y };
+    let way = (normal + 0.07 * aside + 0.03 * normal.cross(aside)).normalize();
+    let mut bodies = 0;
+    for (triangle, _) in t.is_solid.iter().enumerate().filter(|(_, is_solid)| **is_solid) {
+        let [a, b, c] = t.corners(triangle as u32);
+        let n = (b - a).cross(c - a);
+        let distance = (a - place).dot(n) / way.dot(n);
+        let p = place + distance * way;
+        let is_met = [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(p - s).dot(n) >= 0.0);
+        if is_met && distance > f64::from(t.ray_offset) {
+            bodies += if way.dot(n) > 0.0 { 1 } else { -1 };
         }
-        places
-    };
-    t.rules.iter().map(laid).collect()
+    }
+    bodies > 0
 }
 
-/// One such place for each node.
-pub fn nodes(t: &Tables, e: &FaceElement) -> Vec<Vec3> {
-    places_of_nodes(t, e).iter().map(|places| places[0]).collect()
+/// Where `uv` of an element may be laid: on the nearest of its faces, found by the nearer box at every level, with the
+/// normal of that face's front. Where two boxes are as near, single precision takes either.
+fn laid(t: &Tables, e: &FaceElement, uv: DVec2) -> Vec<(DVec3, DVec3)> {
+    let inst = &t.instances[e.instance as usize];
+    let (linear, at) = frame(inst);
+    let side = if inst.is_back != 0 { -1.0 } else { 1.0 };
+    let front = |corners: [DVec3; 3]| (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize();
+    if e.place_count == 1 {
+        let corners = t.corners(t.triangle_at(inst, e.first_place - inst.first_triangle));
+        let uv = if uv.x + uv.y > 1.0 { 1.0 - uv } else { uv };
+        let place = corners[0] * (1.0 - uv.x - uv.y) + corners[1] * uv.x + corners[2] * uv.y;
+        return vec![(place, front(corners))];
+    }
+    let point = plane_point(e, uv);
+    let q = linear.inverse() * (point - at);
+    let in_box = |k: u32| {
+        let (c, h) = (&t.clusters[k as usize], t.clusters[k as usize].half_extent.as_dvec3());
+        c.center.as_dvec3() + turn(c) * (turn(c).inverse() * (q - c.center.as_dvec3())).clamp(-h, h)
+    };
+    let (mut places, mut stack) = (Vec::new(), vec![e.cluster]);
+    while let Some(cluster) = stack.pop() {
+        if let Some([left, right]) = t.children(cluster) {
+            let (to_left, to_right) = (in_box(left).distance(q), in_box(right).distance(q));
+            let slack = 1e-5;
+            stack.extend((to_right <= to_left + slack).then_some(right));
+            stack.extend((to_left <= to_right + slack).then_some(left));
+            continue;
+        }
+        let c = &t.clusters[cluster as usize];
+        places.push(if count(c) > 1 {
+            (linear * in_box(cluster) + at, side * e.axis_z.as_dvec3())
+        } else {
+            let corners = t.corners(t.triangle_at(inst, c.first_face));
+            (nearest(point, corners).lerp(corners.iter().sum::<DVec3>() / 3.0, 0.05), front(corners))
+        });
+    }
+    places
+}
+
+/// The nodes of an element, and the share of its area that is not hidden.
+pub struct Nodes {
+    pub places: Vec<Vec3>,
+    pub share: f64,
+    /// Per node: single precision finds the same place.
+    pub is_clear: Vec<bool>,
+}
+
+/// `lay_nodes`.
+pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
+    let side = if t.instances[e.instance as usize].is_back != 0 { -1.0 } else { 1.0 };
+    let (mut places, mut free, mut is_clear, mut exposed) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+    for rule in t.rules_of(e) {
+        let (mut last, mut clear) = ((DVec3::ZERO, false), true);
+        for k in 0..TRIES {
+            let step = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2) * k as f64;
+            let found = laid(t, e, (rule.uv.as_dvec2() + step).fract());
+            clear &= found.iter().all(|(place, _)| place.distance(found[0].0) < 1e-4);
+            last = (found[0].0, !is_hidden(t, found[0].0, side * found[0].1));
+            exposed += f64::from(u8::from(last.1 && k == 0));
+            if last.1 {
+                break;
+            }
+        }
+        places.push(last.0);
+        free.push(last.1);
+        is_clear.push(clear);
+    }
+    if let Some(seen) = free.iter().rposition(|&free| free) {
+        let seen = places[seen];
+        places.iter_mut().zip(&free).filter(|(_, free)| !**free).for_each(|(place, _)| *place = seen);
+    }
+    let share = (exposed / places.len() as f64).max(1.0 / 32.0);
+    if share < 1.0 && !is_clear.iter().all(|&clear| clear) {
+        is_clear.iter_mut().for_each(|clear| *clear = false);
+    }
+    Nodes { places: places.iter().map(|p| p.as_vec3()).collect(), share, is_clear }
+}
+
+/// Where node `k` of an element counts as standing in its square.
+pub fn node_coordinates(t: &Tables, e: &FaceElement, nodes: &[Vec3], k: usize) -> DVec2 {
+    if e.place_count == 1 { plane_coordinates(e, nodes[k].as_dvec3()) } else { t.rules_of(e)[k].uv.as_dvec2() }
+}
+
+/// `fit_functions`: a row a function, a column a receiver node; and the functions' means. By Gauss and Jordan.
+pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let at: Vec<Vec<f64>> = (0..t.receiver_nodes)
+        .map(|r| node_coordinates(t, e, nodes, r))
+        .map(|uv| (0..functions).map(|k| basis(k, uv)).collect())
+        .collect();
+    let weights: Vec<f64> = t.rules_of(e)[..t.receiver_nodes].iter().map(|rule| f64::from(rule.weight)).collect();
+    let sum = |j: usize, k: usize| -> f64 { at.iter().zip(&weights).map(|(b, w)| w * b[j] * b[k]).sum() };
+    let mut rows: Vec<Vec<f64>> = (0..functions)
+        .map(|j| {
+            let squares = (0..functions).map(|k| sum(j, k) + if j == k { 1e-3 } else { 0.0 });
+            squares.chain(at.iter().zip(&weights).map(|(b, w)| w * b[j])).collect()
+        })
+        .collect();
+    for j in 0..functions {
+        let pivot = rows[j][j];
+        rows[j].iter_mut().for_each(|v| *v /= pivot);
+        let own = rows[j].clone();
+        for (_, row) in rows.iter_mut().enumerate().filter(|(k, _)| *k != j) {
+            let factor = row[j];
+            row.iter_mut().zip(&own).for_each(|(v, o)| *v -= factor * o);
+        }
+    }
+    let mut rows: Vec<Vec<f64>> = rows.into_iter().map(|row| row[functions..].to_vec()).collect();
+    let means: Vec<f64> = (0..functions).map(|j| sum(j, 0)).collect();
+    for r in 0..t.receiver_nodes {
+        let said: f64 = (0..functions).map(|k| means[k] * rows[k][r]).sum();
+        rows[0][r] += weights[r] - said;
+    }
+    (rows, means)
+}
+
+/// Elements without what is hidden of them.
+pub fn exposed(mut e: FaceElement, share: f64) -> FaceElement {
+    e.area = (f64::from(e.area) * share) as f32;
+    e.facing = e.facing.map(|sum| (f64::from(sum) * share) as f32);
+    e
 }
 
 /// `lib/cluster_basis.glsl`.

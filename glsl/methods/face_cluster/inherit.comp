@@ -62,7 +62,9 @@ void inherit(uint child, uint k)
     indirect_irradiance[at] = kept(indirect, constant_indirect, c.axis_z);
     for (uint w = 0; w < 9; ++w) arriving[at * 9 + w] = 0;
     if (k >= RADIOSITY_FUNCTIONS) return;
-    vec3 share = share_of(c.albedo, p.albedo);
+    // As much power as the parent's, whatever parts of it and of its children were found to be hidden.
+    float children_area = elements[p.children].area + elements[p.children + 1].area;
+    vec3 share = min(p.area / max(children_area, 1e-30), 2.0) * share_of(c.albedo, p.albedo);
     vec3 emitted = k == 0 ? PI * c.emission : vec3(0.0);
     unshot[child * RADIOSITY_FUNCTIONS + k] = params.is_emission != 0 ? emitted : share * shoots;
     next_unshot[child * RADIOSITY_FUNCTIONS + k] = share * shoots_next;

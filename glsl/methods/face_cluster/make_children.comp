@@ -4,10 +4,10 @@
 #include "methods/face_cluster/make_element.glsl"
 
 // Two threads' work per pair of the step: makes the elements claimed in this step.            [Gobbetti2003 3.3.4]
-// reads counters and the tables of make_element   updates elements   writes element_nodes   shared none
+// reads counters and the tables of make_element   updates elements   writes element_nodes, fits, function_means   shared none
 layout(local_size_x = 64) in;
-layout(set = 0, binding = 10, scalar) readonly buffer Counters { PairCounters counters[]; };
-layout(push_constant, scalar) uniform Params { uint capacity; } params;
+layout(set = 0, binding = 15, scalar) readonly buffer Counters { PairCounters counters[]; };
+layout(push_constant, scalar) uniform Params { uint capacity; float ray_offset; } params;
 
 void main()
 {
@@ -18,6 +18,6 @@ void main()
         uint e = pool[0].made_count + i + half_step * counters[0].taken;
         if (e >= end) continue;
         uint parent = elements[e].parent;
-        make_element(e, elements[parent].instance, elements[e].cluster, parent, elements[parent].level + 1);
+        make_element(e, elements[parent].instance, elements[e].cluster, parent, elements[parent].level + 1, params.ray_offset);
     }
 }

@@ -21,10 +21,10 @@ void main()
     if (element.children != NO_FACE_ELEMENT) {
         vec3 sums[MOST_FUNCTIONS];
         for (uint k = 0; k < RADIOSITY_FUNCTIONS; ++k) sums[k] = vec3(0.0);
-        float area = elements[element.children].area + elements[element.children + 1].area;
         for (uint c = element.children; c < element.children + 2; ++c) {
             FaceElement child = elements[c];
-            float share = area > 0.0 ? child.area / area : 0.5;
+            // Power is kept, whatever parts of both were found to be hidden.
+            float share = element.area > 0.0 ? child.area / element.area : 0.5;
             for (uint g = 0; g < 16; ++g) {
                 vec2 uv = gauss_point(g), place = plane_coordinates(element, plane_point(child, uv));
                 vec3 value = vec3(0.0);

@@ -1,6 +1,6 @@
 #ifndef FACE_CLUSTER_RECEIVE
 #define FACE_CLUSTER_RECEIVE
-// Bindings 0 to 12 and set 1 of every kernel that decides pairs: whether light passes between two places, and what the
+// Bindings 0 to 12, 21 and set 1 of every kernel that decides pairs: whether light passes between two places, and what the
 // receiver keeps of it. Faces of the two elements block nothing: what one side of a cluster does to the other is the
 // matter of its self transfer.
 #include "lib/bvh.glsl"
@@ -18,14 +18,16 @@ layout(set = 0, binding = 5, scalar) readonly buffer Materials { Material materi
 layout(set = 0, binding = 6, scalar) readonly buffer Places { uint triangle_places[]; };            // per triangle
 layout(set = 0, binding = 7, scalar) readonly buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Nodes { vec3 element_nodes[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer Rules { CubatureNode rules[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Fits { float fits[]; };                       // per element, function, receiver node
 layout(set = 0, binding = 10, scalar) readonly buffer Skips { uint cluster_skips[]; };
 layout(set = 0, binding = 11, scalar) buffer Arriving { int arriving[]; };                          // per element, function, channel, axis
 layout(set = 0, binding = 12, scalar) buffer Pool { PoolCounters pool[]; };
+layout(set = 0, binding = 21, scalar) readonly buffer Rules { CubatureNode rules[]; };               // of the receiver, then the shooter: on the square, then on a triangle
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
 layout(constant_id = 2) const uint IRRADIANCE_FUNCTIONS = 3u;
+const uint RULE_NODES = RECEIVER_NODES + SHOOTER_NODES;
 layout(constant_id = 3) const bool ALPHA_TEST = false;
 layout(constant_id = 5) const bool CLUSTERS_BLOCK = false;  // multiresolution visibility instead of rays
 
@@ -59,7 +61,7 @@ float visibility(FaceElement receiver, Ray ray)
     return is_hit(traverse(ray, true)) ? 0.0 : 1.0;
 }
 
-vec3 receiver_node(uint element, uint k) { return element_nodes[element * (RECEIVER_NODES + SHOOTER_NODES) + k]; }
+vec3 receiver_node(uint element, uint k) { return element_nodes[element * RULE_NODES + k]; }
 vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER_NODES + k); }
 
 // Whether the element's cluster has smaller ones below it.
@@ -82,12 +84,19 @@ vec3 kept_vector(FaceElement e, vec3 direction)
     return (along > 0.0 ? direction : vec3(0.0)) + beyond / max(vector_area(e), LEAST_FLAT_SHARE * e.area) * e.axis_z;
 }
 
+// Where a node counts as standing in its element's square: a face's where it is, others where the rule has them.
+vec2 node_coordinates(FaceElement e, uint element, uint k)
+{
+    return e.place_count == 1 ? plane_coordinates(e, receiver_node(element, k)) : rules[k].uv;
+}
+
 // What arrived at the receiver's nodes (a column a channel), on its functions.                 [Gobbetti2003 Eq. 7]
-void project(mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions[IRRADIANCE_FUNCTIONS])
+void project(uint receiver, mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions[IRRADIANCE_FUNCTIONS])
 {
     [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
         on_functions[k] = mat3(0.0);
-        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) on_functions[k] += rules[r].weight * basis(k, rules[r].uv) * at_nodes[r];
+        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r)
+            on_functions[k] += fits[(receiver * IRRADIANCE_FUNCTIONS + k) * RECEIVER_NODES + r] * at_nodes[r];
     }
 }
 

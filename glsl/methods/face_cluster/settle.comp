@@ -4,18 +4,15 @@
 #include "lib/face_element.glsl"
 
 // One thread per element and function, of one level after the other: adds what the element's parent passes down (by
-// change of basis, a vector only where it lies in the element's half-space) to what it got itself. A leaf keeps it and
-// reflects it next.
+// change of basis, a vector only where it lies in the element's half-space) to what it got itself. A leaf keeps it.
 //                                                                                    [Gobbetti2003 3.3.4, Alg. 1]
-// reads elements   updates arriving (whole units; from here on bits of floats, W/m2), direct or indirect irradiance,
-// next_unshot   shared none
+// reads elements   updates arriving (whole units; from here on bits of floats, W/m2), direct or indirect irradiance
+// shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 1, scalar) buffer Arriving { int arriving[]; };               // per element, function, channel, axis
 layout(set = 0, binding = 2, scalar) buffer Irradiance { mat3 irradiance[]; };          // per element and function; a column a channel
-layout(set = 0, binding = 3, scalar) buffer NextUnshot { vec3 next_unshot[]; };         // per element and function, W/m2
 layout(constant_id = 0) const uint IRRADIANCE_FUNCTIONS = 3u;
-layout(constant_id = 1) const uint RADIOSITY_FUNCTIONS = 1u;
 layout(push_constant, scalar) uniform Params {
     uint element_count;
     uint level;
@@ -63,10 +60,5 @@ void main()
         for (uint axis = 0; axis < 3; ++axis) arriving[i * 9 + 3 * c + axis] = floatBitsToInt(sum[c][axis]);
     if (element.children != NO_FACE_ELEMENT) return;
 
-    // B = rho n.E, with the mean normal of all faces, shorter than 1 where they differ.        [Gobbetti2003 Eq. 9]
     if (params.is_kept != 0) irradiance[i] += sum;
-    if (k >= RADIOSITY_FUNCTIONS) return;
-    vec3 normal = element.axis_z * (vector_area(element) / max(element.area, 1e-30));
-    vec3 reflected = element.albedo * (normal * sum);
-    next_unshot[e * RADIOSITY_FUNCTIONS + k] += k == 0 ? max(reflected, vec3(0.0)) : reflected;
 }

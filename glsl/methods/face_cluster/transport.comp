@@ -53,11 +53,12 @@ void main()
     }
     if (!may_face(a, b) || !may_face(b, a)) return;
 
+    uint rule = RECEIVER_NODES + (b.place_count == 1 ? RULE_NODES : 0);
     vec3 radiosity[SHOOTER_NODES];
     [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
         radiosity[e] = unshot[shooter * RADIOSITY_FUNCTIONS];
         [[dont_unroll]] for (uint k = 1; k < RADIOSITY_FUNCTIONS; ++k)
-            radiosity[e] += basis(k, rules[RECEIVER_NODES + e].uv) * unshot[shooter * RADIOSITY_FUNCTIONS + k];
+            radiosity[e] += basis(k, node_coordinates(b, shooter, RECEIVER_NODES + e)) * unshot[shooter * RADIOSITY_FUNCTIONS + k];
         radiosity[e] = max(radiosity[e], vec3(0.0));
     }
 
@@ -88,7 +89,7 @@ void main()
             least[r] = min(least[r], scale * least_projected_area(b, -direction) * least_projected_area(a, direction));
             greatest[r] = max(greatest[r], scale * most_projected_area(b, -direction) * most_projected_area(a, direction));
             // m(x, y) B(y).                                                                    [Gobbetti2003 Eq. 3]
-            float share = rules[RECEIVER_NODES + e].weight * projected_area(b, -direction) / (PI * squared);
+            float share = rules[rule + e].weight * projected_area(b, -direction) / (PI * squared);
             vec3 kept = share * kept_vector(a, direction);
             sends = sends || share > 0.0;
             sum += length(kept);
@@ -150,7 +151,7 @@ void main()
     }
 
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
-    project(at_nodes, on_functions);
+    project(receiver, at_nodes, on_functions);
     if (!is_small && may_split) {
         // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
         float error = 0.0;
@@ -158,8 +159,9 @@ void main()
         uint channel = strongest.x >= max(strongest.y, strongest.z) ? 0 : strongest.y >= strongest.z ? 1 : 2;
         [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
             float said = 0.0;
+            vec2 uv = node_coordinates(a, receiver, r);
             [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-                said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
+                said += basis(k, uv) * dot(a.axis_z, on_functions[k][channel]);
             said *= vector_area(a);
             error = max(error, max(said - least[r], greatest[r] - said));
         }

@@ -82,14 +82,15 @@ void main()
     }
 
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
-    project(at_nodes, on_functions);
+    project(receiver, at_nodes, on_functions);
     if (!is_small && can_split(a)) {
         float error = 0.0;
         uint channel = light.intensity.x >= max(light.intensity.y, light.intensity.z) ? 0 : light.intensity.y >= light.intensity.z ? 1 : 2;
         [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
             float said = 0.0;
+            vec2 uv = node_coordinates(a, receiver, r);
             [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-                said += basis(k, rules[r].uv) * dot(a.axis_z, on_functions[k][channel]);
+                said += basis(k, uv) * dot(a.axis_z, on_functions[k][channel]);
             said *= vector_area(a);
             error = max(error, max(said - least[r], greatest[r] - said));
         }

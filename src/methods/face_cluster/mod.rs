@@ -18,13 +18,15 @@
 //! | Delta B, Delta B' | unshot, next unshot | W/m2 | `face-cluster/unshot`, `face-cluster/next unshot` |
 //! | delta_ij | error against [`Settings::threshold`] | W | `transport` |
 //! | F_ii | `self_share` | 1 | `transport` |
+//! | – | `fits`: nodes to functions | 1 | `face-cluster/fits`, `face-cluster/function means` |
 //!
 //! **Per frame without new clusters:** lights, environment; everything is shot anew. **With new clusters:** surfaces
 //! and materials.
 //!
 //! Differs from [Gobbetti2003]: pairs are refined level by level by all threads at once and their contributions summed
 //! in whole units, so that the result does not depend on their order; punctual lights and an environment shine too;
-//! cubature nodes are laid on the faces, and a shooter of one face is measured exactly;
+//! cubature nodes are laid on the faces, on a single one by a rule for triangles, and a shooter of one face is measured
+//! exactly; what lies inside other closed bodies is no surface: it neither takes light nor weighs in a cluster's mean;
 //! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
 //! is too small to matter, since one normal would leave half of them dark; a transfer takes one shadow ray per receiver node unless told otherwise;
 //! transfers are made with the projected area expected between its bounds, not the lower bound, and what faces get beyond

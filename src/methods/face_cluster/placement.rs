@@ -50,6 +50,8 @@ pub struct Placement {
     pub faces: Buffer<u32>,
     /// Per triangle: its place, trees' places counted from the part's first triangle.
     pub places: Buffer<u32>,
+    /// A bit per triangle: of a closed body, which hides what is inside.
+    pub solids: Buffer<u32>,
     /// Per triangle: instances of its front and back.
     pub triangle_roots: Buffer<UVec2>,
     pub instance_count: u32,
@@ -70,7 +72,8 @@ impl Placement {
     pub fn new(context: &Context, stage: &Stage<'_>, least_area_share: f32) -> Result<Self, FaceClusterError> {
         let materials = face_materials(context, stage)?;
         let positions = context.download(&stage.world.positions)?;
-        let (trees, placed) = build_trees(stage, &materials, &positions);
+        let surfaces = Surfaces::new(stage.geometry, stage.rest_positions);
+        let (trees, placed) = build_trees(stage, &surfaces, &materials, &positions);
         let total_area: f64 = placed.iter().map(|p| f64::from(root_area(&trees, p))).sum();
         let sides = |p: &Placed| if p.has_back { 2.0 } else { 1.0 };
         let emitted_power: Vec3 = placed
@@ -99,6 +102,7 @@ impl Placement {
         let mut instances = Vec::new();
         let mut places: Vec<u32> = (0..geometry.triangle_count()).collect();
         let mut triangle_roots = vec![UVec2::splat(NO_ELEMENT); geometry.triangles.len()];
+        let mut solids = vec![0u32; geometry.triangles.len().div_ceil(32)];
         let mut placed_clusters = 0;
         for p in &placed {
             let part = &geometry.parts[p.part as usize];
@@ -120,6 +124,8 @@ impl Placement {
                 let triangle = (part.triangle_offset + face) as usize;
                 places[triangle] = part.triangle_offset + place as u32;
                 triangle_roots[triangle] = UVec2::new(front, back);
+                let surface = surfaces.of_vertex[geometry.triangles[triangle][0] as usize];
+                solids[triangle / 32] |= u32::from(surfaces.is_solid[surface as usize]) << (triangle % 32);
             }
         }
         let faces: Vec<u32> = trees.iter().flat_map(|tree| tree.faces.iter().copied()).collect();
@@ -129,6 +135,7 @@ impl Placement {
             instances: context.upload("face-cluster/instances", &instances)?,
             faces: context.upload("face-cluster/faces", &faces)?,
             places: context.upload("face-cluster/places", &places)?,
+            solids: context.upload("face-cluster/solids", &solids)?,
             triangle_roots: context.upload("face-cluster/triangle roots", &triangle_roots)?,
             instance_count: instances.len() as u32,
             placed_clusters,
@@ -230,9 +237,13 @@ fn similarity(stage: &Stage<'_>, part: &Part) -> Option<(Mat4, f32)> {
     (scale > 0.0 && is_even && is_square && m.determinant() > 0.0).then_some((m, scale))
 }
 
-fn build_trees(stage: &Stage<'_>, materials: &FaceMaterials, world: &[Vec3]) -> (Vec<ClusterTree>, Vec<Placed>) {
+fn build_trees(
+    stage: &Stage<'_>,
+    surfaces: &Surfaces,
+    materials: &FaceMaterials,
+    world: &[Vec3],
+) -> (Vec<ClusterTree>, Vec<Placed>) {
     let geometry = stage.geometry;
-    let surfaces = Surfaces::new(geometry, stage.rest_positions);
     let mut keys = HashMap::new();
     let (mut wanted, mut placed) = (Vec::new(), Vec::new());
     for (index, part) in geometry.parts.iter().enumerate() {

@@ -2,6 +2,7 @@
 //!
 //! [Gobbetti2003]: crate::methods::PAPERS
 
+use super::transfer::ray_offset;
 use super::{FaceClusterError, FaceClusters, Stage, lights};
 use crate::gpu::shaders::methods::face_cluster as passes;
 use crate::gpu::shaders::types::{Light, PoolCounters};
@@ -180,9 +181,18 @@ impl FaceClusters {
             rules: &s.rules,
             elements: &s.elements,
             element_nodes: &s.nodes,
+            fits: &s.fits,
+            function_means: &s.function_means,
             pool: &s.pool,
-            params: passes::MakeRootsParams { instance_count: p.instance_count },
-            constants: passes::MakeRootsConstants { rule_nodes: s.rules.len() as u32 },
+            bvh_nodes: stage.bvh.nodes(),
+            bvh_triangles: stage.bvh.triangles(),
+            solids: &p.solids,
+            params: passes::MakeRootsParams { instance_count: p.instance_count, ray_offset: ray_offset(stage) },
+            constants: passes::MakeRootsConstants {
+                receiver_nodes: self.settings.receiver_rule.nodes().len() as u32,
+                shooter_nodes: self.settings.shooter_rule.nodes().len() as u32,
+                irradiance_functions: self.settings.irradiance_basis.functions(),
+            },
         };
         recorder.dispatch(&pass, p.instance_count);
         recorder.submit()?;

@@ -14,11 +14,15 @@ pub struct State {
     pub(super) capacity: u32,
     /// What `capacity` may become: by the settings, by the clusters there are, by what one buffer holds.
     pub(super) most: u32,
-    /// Of the receiver's rule, then of the shooter's.
+    /// Of the receiver's rule, then of the shooter's; on the square, then on a triangle.
     pub(super) rules: Buffer<CubatureNode>,
     pub elements: Buffer<FaceElement>,
     /// Per element and rule node, metres.
     pub(super) nodes: Buffer<Vec3>,
+    /// Per element, irradiance function and receiver node: how much of what arrives there the function gets.
+    pub(super) fits: Buffer<f32>,
+    /// Per element and irradiance function: its mean over the element's faces.
+    pub(super) function_means: Buffer<f32>,
     /// Per element and radiosity function, W/m2.
     pub(super) unshot: Buffer<Vec3>,
     pub(super) next_unshot: Buffer<Vec3>,
@@ -38,10 +42,11 @@ pub struct State {
     pub(super) triangle_leaves: Buffer<UVec2>,
 }
 
-/// Entries of the tables of an element: rule nodes, radiosity functions, irradiance functions.
+/// Entries of the tables of an element: rule nodes, those of the receiver, radiosity functions, irradiance functions.
 #[derive(Clone, Copy)]
 struct Shape {
     nodes: usize,
+    receiver_nodes: usize,
     radiosity: usize,
     irradiance: usize,
 }
@@ -50,16 +55,19 @@ impl Shape {
     fn of(settings: &Settings) -> Self {
         Self {
             nodes: settings.receiver_rule.nodes().len() + settings.shooter_rule.nodes().len(),
+            receiver_nodes: settings.receiver_rule.nodes().len(),
             radiosity: settings.radiosity_basis.functions() as usize,
             irradiance: settings.irradiance_basis.functions() as usize,
         }
     }
 
-    /// Of the largest table, and of all, a element.
+    /// Of the largest table, and of all, an element.
     fn bytes(self) -> (u64, u64) {
         let element = size_of::<FaceElement>();
-        let widest = (12 * self.nodes).max(36 * self.irradiance).max(element);
-        (widest as u64, (element + 12 * self.nodes + 24 * self.radiosity + 108 * self.irradiance + 4) as u64)
+        let fits = 4 * self.irradiance * self.receiver_nodes;
+        let widest = (12 * self.nodes).max(36 * self.irradiance).max(element).max(fits);
+        let all = element + 12 * self.nodes + 24 * self.radiosity + 112 * self.irradiance + fits + 4;
+        (widest as u64, all as u64)
     }
 }
 
@@ -73,6 +81,8 @@ impl State {
     ) -> Result<Self, FaceClusterError> {
         let mut rules = settings.receiver_rule.nodes();
         rules.extend(settings.shooter_rule.nodes());
+        rules.extend(settings.receiver_rule.triangle_nodes());
+        rules.extend(settings.shooter_rule.triangle_nodes());
         let shape = Shape::of(settings);
         let roots = placement.instance_count;
         let allowed = context.limits().storage_buffer_bytes / shape.bytes().0;
@@ -87,6 +97,8 @@ impl State {
             rules: context.upload("face-cluster/rules", &rules)?,
             elements: pool.elements,
             nodes: pool.nodes,
+            fits: pool.fits,
+            function_means: pool.function_means,
             unshot: pool.unshot,
             next_unshot: pool.next_unshot,
             direct: pool.direct,
@@ -111,6 +123,8 @@ impl State {
         let mut recorder = context.recorder("face-cluster")?;
         recorder.copy(&self.elements, &larger.elements);
         recorder.copy(&self.nodes, &larger.nodes);
+        recorder.copy(&self.fits, &larger.fits);
+        recorder.copy(&self.function_means, &larger.function_means);
         recorder.copy(&self.unshot, &larger.unshot);
         recorder.copy(&self.next_unshot, &larger.next_unshot);
         recorder.copy(&self.direct, &larger.direct);
@@ -139,6 +153,8 @@ impl State {
         self.capacity = capacity;
         self.elements = tables.elements;
         self.nodes = tables.nodes;
+        self.fits = tables.fits;
+        self.function_means = tables.function_means;
         self.unshot = tables.unshot;
         self.next_unshot = tables.next_unshot;
         self.direct = tables.direct;
@@ -151,6 +167,11 @@ impl State {
     /// Of so many elements with all their tables.
     pub(super) fn bytes(settings: &Settings, elements: u32) -> u64 {
         Shape::of(settings).bytes().1 * u64::from(elements)
+    }
+
+    /// Per element and irradiance function: its mean over the faces that are not hidden.
+    pub fn function_means(&self) -> &Buffer<f32> {
+        &self.function_means
     }
 
     /// From emitters and the environment, per element and function; of leaves.
@@ -185,6 +206,8 @@ fn check(context: &Context, shape: Shape, capacity: u32) -> Result<(), FaceClust
 struct Tables {
     elements: Buffer<FaceElement>,
     nodes: Buffer<Vec3>,
+    fits: Buffer<f32>,
+    function_means: Buffer<f32>,
     unshot: Buffer<Vec3>,
     next_unshot: Buffer<Vec3>,
     direct: Buffer<[[f32; 3]; 3]>,
@@ -200,6 +223,8 @@ impl Tables {
         Ok(Self {
             elements: context.buffer(&buffer("elements"), capacity)?,
             nodes: context.buffer(&buffer("nodes"), capacity * shape.nodes)?,
+            fits: context.buffer(&buffer("fits"), capacity * shape.irradiance * shape.receiver_nodes)?,
+            function_means: context.buffer(&buffer("function means"), capacity * shape.irradiance)?,
             unshot: context.buffer(&buffer("unshot"), capacity * shape.radiosity)?,
             next_unshot: context.buffer(&buffer("next unshot"), capacity * shape.radiosity)?,
             direct: context.buffer(&buffer("direct"), capacity * shape.irradiance)?,

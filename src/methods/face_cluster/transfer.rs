@@ -15,6 +15,11 @@ const MOST_UNITS: f32 = (1 << 26) as f32;
 /// How far rays to lights start off their surface, as a share of the scene's diagonal.
 const RAY_OFFSET: f32 = 1e-5;
 
+/// Metres.
+pub(super) fn ray_offset(stage: &Stage<'_>) -> f32 {
+    RAY_OFFSET * (stage.bounds[1] - stage.bounds[0]).length()
+}
+
 impl FaceClusters {
     /// Shoots, settles and pulls.
     pub(super) fn shoot(
@@ -142,6 +147,7 @@ impl FaceClusters {
                     triangle_places: &p.places,
                     elements: &s.elements,
                     element_nodes: &s.nodes,
+                    fits: &s.fits,
                     rules: &s.rules,
                     cluster_skips: &p.skips,
                     clusters: &p.clusters,
@@ -210,10 +216,19 @@ impl FaceClusters {
             rules: &s.rules,
             elements: &s.elements,
             element_nodes: &s.nodes,
+            fits: &s.fits,
+            function_means: &s.function_means,
             pool: &s.pool,
+            bvh_nodes: stage.bvh.nodes(),
+            bvh_triangles: stage.bvh.triangles(),
+            solids: &p.solids,
             counters: &queue.counters,
-            params: passes::MakeChildrenParams { capacity },
-            constants: passes::MakeChildrenConstants { rule_nodes: s.rules.len() as u32 },
+            params: passes::MakeChildrenParams { capacity, ray_offset: ray_offset(stage) },
+            constants: passes::MakeChildrenConstants {
+                receiver_nodes: self.settings.receiver_rule.nodes().len() as u32,
+                shooter_nodes: self.settings.shooter_rule.nodes().len() as u32,
+                irradiance_functions: self.settings.irradiance_basis.functions(),
+            },
         };
         recorder.dispatch_indirect(&make, &queue.groups);
         let inherit = passes::Inherit {
@@ -249,11 +264,16 @@ impl FaceClusters {
         let functions = self.settings.irradiance_basis.functions() as usize;
         let elements = context.download_range(&self.state.elements, 0..count)?;
         let arrived = context.download_range(&self.state.arriving, 0..count * functions * 9)?;
-        let leaves = elements.iter().zip(arrived.chunks(9 * functions)).filter(|(e, _)| e.children == NO_ELEMENT);
-        let power = leaves.map(|(e, words)| {
+        let means = context.download_range(&self.state.function_means, 0..count * functions)?;
+        let light = arrived.chunks(9 * functions).zip(means.chunks(functions));
+        let leaves = elements.iter().zip(light).filter(|(e, _)| e.children == NO_ELEMENT);
+        let power = leaves.map(|(e, (words, means))| {
             let normal = e.axis_z * (e.facing[4] - e.facing[5]).max(0.0);
-            let along = |c: usize| (0..3).map(|k| normal[k] * f32::from_bits(words[3 * c + k] as u32)).sum::<f32>();
-            DVec3::new(along(0).into(), along(1).into(), along(2).into())
+            let of = |(words, mean): (&[i32], &f32), c: usize| -> f32 {
+                mean * (0..3).map(|k| normal[k] * f32::from_bits(words[3 * c + k] as u32)).sum::<f32>()
+            };
+            let along = |c: usize| f64::from(words.chunks(9).zip(means).map(|row| of(row, c)).sum::<f32>());
+            DVec3::new(along(0), along(1), along(2))
         });
         Ok(power.sum::<DVec3>().to_array())
     }
@@ -276,17 +296,25 @@ impl FaceClusters {
                 elements: &s.elements,
                 arriving: &s.arriving,
                 irradiance: if kept == Kept::Indirect { &s.indirect } else { &s.direct },
-                next_unshot: &s.next_unshot,
                 params: passes::SettleParams {
                     element_count,
                     level,
                     inverse_units,
                     is_kept: u32::from(kept != Kept::No),
                 },
-                constants: passes::SettleConstants { irradiance_functions, radiosity_functions },
+                constants: passes::SettleConstants { irradiance_functions },
             };
             recorder.dispatch(&pass, element_count * irradiance_functions);
         }
+        let reflect = passes::Reflect {
+            elements: &s.elements,
+            arriving: &s.arriving,
+            function_means: &s.function_means,
+            next_unshot: &s.next_unshot,
+            params: passes::ReflectParams { element_count },
+            constants: passes::ReflectConstants { irradiance_functions, radiosity_functions },
+        };
+        recorder.dispatch(&reflect, element_count);
         for level in (0..=counters.deepest_level).rev() {
             let pass = passes::Pull {
                 elements: &s.elements,
