@@ -2,17 +2,15 @@
 #define GLOSS
 // Specular reflection of a leaf towards a direction, from its incident bins.
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
-// means, peaks, has params.node_count, params.leaf_count and params.undershoot, and defines
+// means, peaks, has params.leaf_count, params.node_count and params.undershoot, and
+// defines
 //     vec3 beside(uint bin)       radiance that arrives beside what the table holds
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
 #include "lib/specular_albedo.glsl"
-#include "methods/antiradiance/floor.glsl"
+#include "methods/antiradiance/glossy_arrival.glsl"
 #include "methods/antiradiance/glossy_surface.glsl"
-#include "methods/antiradiance/table.glsl"
-
-vec3 beside(uint bin);
 
 // Radiance reflected towards `to_eye`: the lobe's albedo times the mean of what arrives within it, so that the sum over
 // few bins neither makes nor loses light.                                                        [Dachsbacher2007 Eq. 18]
@@ -32,10 +30,7 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
         float cosine = dot(normal, w);
         if (cosine > 0.0) continue;
         vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
-        vec3 arriving = LOAD_ENTRY(incident, entry_of(own.node, bin, params.node_count));
-        if (parent != NONE) arriving += LOAD_ENTRY(incident, entry_of(parent, bin, params.node_count));
-        float peak = peaks[bin * params.leaf_count + leaf];
-        sum += weight * max(arriving + beside(bin), lowest_of(peak, mean, params.undershoot));
+        sum += weight * glossy_arrival(leaf, own.node, parent, bin, mean);
         weights += weight;
     }
     vec3 within = sum / max(weights, vec3(1e-20));

@@ -12,6 +12,9 @@ use crate::stages::hierarchy::{Hierarchy, NONE};
 use crate::stages::world::World;
 use glam::Vec3;
 
+/// Bins of a thread, in `reflect_glossy.comp`.
+const SENT_BINS: u32 = 8;
+
 /// The glossy leaves of a scene.
 pub struct Gloss {
     pub count: u32,
@@ -23,7 +26,9 @@ pub struct Gloss {
     pub glossy_of_leaf: Buffer<u32>,
     /// Per glossy leaf and bin: what the lobe sends, W m^-2 sr^-1.
     pub specular: Buffer<Vec3>,
-    /// The same of direct light that came along links, alone.
+    /// Per glossy leaf and bin, words as in [`Tables`]: radiance that arrived last.
+    arrived: Buffer<u64>,
+    /// What is sent of direct light that came along links, alone.
     pub base: Buffer<Vec3>,
 }
 
@@ -40,7 +45,7 @@ impl Gloss {
         elements: &Elements,
         world: &World,
         threshold: f32,
-        bin_count: u32,
+        (bin_count, half): (u32, bool),
     ) -> Result<Self, GpuError> {
         let leaf_count = hierarchy.leaf_count();
         let lobes = context.buffer("antiradiance/gloss", leaf_count as usize)?;
@@ -56,12 +61,14 @@ impl Gloss {
             .collect();
         let mut glossy_of_leaf = vec![NONE; leaf_count as usize];
         glossy.iter().zip(0..).for_each(|(&leaf, index)| glossy_of_leaf[leaf as usize] = index);
+        let entries = glossy.len() * bin_count as usize;
         Ok(Self {
             count: glossy.len() as u32,
+            arrived: context.buffer("antiradiance/arrived at glossy leaves", entries * Tables::words(half) as usize)?,
             leaves: context.upload("antiradiance/glossy leaves", &glossy)?,
             glossy_of_leaf: context.upload("antiradiance/glossy of leaf", &glossy_of_leaf)?,
-            specular: context.buffer("antiradiance/specular", glossy.len() * bin_count as usize)?,
-            base: context.buffer("antiradiance/specular of direct light", glossy.len() * bin_count as usize)?,
+            specular: context.buffer("antiradiance/specular", entries)?,
+            base: context.buffer("antiradiance/specular of direct light", entries)?,
             lobes,
         })
     }
@@ -76,24 +83,19 @@ impl Gloss {
         has_environment: bool,
         bounces: f32,
     ) {
-        let pass = passes::ReflectGlossy {
+        let (words, bin_count) = (Tables::words(tables.half) as u32, tables.bin_count);
+        let arrive = passes::ArriveGlossy {
             glossy_leaves: &self.leaves,
             leaves: &hierarchy.leaves,
             nodes: &hierarchy.nodes,
-            gloss: &self.lobes,
-            cosine_norms: &tables.cosine_norms,
             bin_directions: &bins.directions,
             means: &tables.means,
             peaks: &tables.peaks,
             incident: &tables.incident,
-            base: &self.base,
             environment: &tables.environment,
-            specular: &self.specular,
-            constants: passes::ReflectGlossyConstants {
-                words: Tables::words(tables.half) as u32,
-                bin_count: tables.bin_count,
-            },
-            params: passes::ReflectGlossyParams {
+            arrived: &self.arrived,
+            constants: passes::ArriveGlossyConstants { words, bin_count },
+            params: passes::ArriveGlossyParams {
                 glossy_count: self.count,
                 leaf_count: hierarchy.leaf_count(),
                 node_count: hierarchy.node_count(),
@@ -101,7 +103,20 @@ impl Gloss {
                 add_environment: u32::from(has_environment),
             },
         };
-        recorder.dispatch(&pass, self.count * tables.bin_count);
+        let reflect = passes::ReflectGlossy {
+            glossy_leaves: &self.leaves,
+            leaves: &hierarchy.leaves,
+            gloss: &self.lobes,
+            cosine_norms: &tables.cosine_norms,
+            bin_directions: &bins.directions,
+            arrived: &self.arrived,
+            base: &self.base,
+            specular: &self.specular,
+            constants: passes::ReflectGlossyConstants { words, bin_count },
+            params: passes::ReflectGlossyParams { glossy_count: self.count },
+        };
+        recorder.dispatch(&arrive, self.count * bin_count);
+        recorder.dispatch(&reflect, self.count * (bin_count / SENT_BINS));
     }
 }
 

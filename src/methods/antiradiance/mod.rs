@@ -176,8 +176,9 @@ impl Antiradiance {
         let hierarchy = Hierarchy::new(context, plan, &elements, stage.world)?;
         let splats = Splats::new(context, &hierarchy, &facets, stage.geometry, &elements)?;
         let bins = DeviceBins::new(context, settings.bins.octant_side(), settings.spread)?;
-        let (bin_count, threshold) = (settings.bins.get(), settings.gloss_threshold);
-        let gloss = Gloss::new(context, &hierarchy, &elements, stage.world, threshold, bin_count)?;
+        let (threshold, bin_count) = (settings.gloss_threshold, settings.bins.get());
+        let gloss =
+            Gloss::new(context, &hierarchy, &elements, stage.world, threshold, (bin_count, settings.half_tables))?;
         let (half, undershoot) = (settings.half_tables, settings.undershoot);
         let tables = Tables::new(context, &hierarchy, &bins, stage.environment, half, undershoot, gloss)?;
         let mut recorder = context.recorder("antiradiance")?;

@@ -215,8 +215,9 @@ impl Tables {
 
     fn local(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, step: LocalStep) {
         if step.reflects {
-            recorder
-                .scope("glossy", |recorder| self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced));
+            recorder.scope("local/glossy", |recorder| {
+                self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced)
+            });
         }
         let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
         let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
