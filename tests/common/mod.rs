@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 pub mod lobe;
+pub mod posed;
 pub mod scenes;
 
 use linklight::gpu::{Context, Options};

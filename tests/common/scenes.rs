@@ -41,6 +41,19 @@ pub fn parallelogram(corner: Vec3, u: Vec3, v: Vec3, cells: u32, material: u32) 
     }
 }
 
+/// Sides and top of a box that stands, each as `cells` x `cells` squares, facing outwards, of material 0.
+pub fn one_sided_box(low: Vec3, high: Vec3, cells: u32) -> Vec<Primitive> {
+    let size = high - low;
+    let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
+    vec![
+        parallelogram(low + z, x, y, cells, 0),
+        parallelogram(low + x, -x, y, cells, 0),
+        parallelogram(low, z, y, cells, 0),
+        parallelogram(low + x + z, -z, y, cells, 0),
+        parallelogram(low + y + z, x, -z, cells, 0),
+    ]
+}
+
 /// One node per primitive, one per light (at `position`, shining along `direction`).
 pub fn scene(materials: Vec<Material>, primitives: Vec<Primitive>, lights: &[(Light, Vec3, Vec3)]) -> Scene {
     let mut scene = Scene { name: "test".into(), materials, ..Scene::default() };

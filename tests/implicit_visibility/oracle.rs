@@ -128,14 +128,16 @@ fn agreement(
 #[test]
 fn brute_force_finds_what_rays_would_and_the_hierarchy_next_to_always() {
     let context = TestContext::new();
-    for (name, max_edge, least) in [("cornell-box", Some(0.4), [0.99, 0.998]), ("dancer", None, [0.97, 0.98])] {
+    for (name, max_edge, least) in [("cornell-box", Some(0.4), [0.99, 0.998]), ("dancer", None, [0.99, 0.993])] {
         let fixture = Fixture::new(&context, builtin_scene(name), max_edge);
         let settings = Settings { bins: 8, fill_holes: false, ..Settings::default() };
         let mut expected = Vec::new();
-        let brute = agreement(&context, &fixture, Settings { brute_force: true, ..settings }, &mut expected);
-        // The rest are rims that rounding decides.
-        assert!(brute.filled > 1500 && brute.share() > 0.998, "{name}: {brute:?}");
-        assert!(brute.empty * 1000 < brute.filled, "{name}: {brute:?}");
+        if max_edge.is_some() {
+            let brute = agreement(&context, &fixture, Settings { brute_force: true, ..settings }, &mut expected);
+            // The rest are rims that rounding decides.
+            assert!(brute.filled > 1500 && brute.share() > 0.998, "{name}: {brute:?}");
+            assert!(brute.empty * 1000 < brute.filled, "{name}: {brute:?}");
+        }
         for (refinement, least) in [1.0, 0.25].into_iter().zip(least) {
             let hierarchy = agreement(&context, &fixture, Settings { refinement, ..settings }, &mut expected);
             // The rest stand at silhouettes: a node's place is off by part of a bin, and the bin goes to what is beside.
@@ -153,8 +155,7 @@ fn light_is_what_the_winners_send() {
     let context = TestContext::new();
     let scene = builtin_scene("cornell-box");
     let sky = Environment::Constant(Vec3::new(0.25, 0.5, 1.0));
-    let pose = Pose::rest(&scene);
-    let fixture = Fixture::posed(&context, scene, Some(0.6), sky, &pose);
+    let fixture = Fixture::posed(&context, scene, Some(0.6), sky, Pose::rest);
     let settings = Settings { bins: 6, smoothing: false, ..Settings::default() };
     let method = fixture.linked(&context, settings);
     let first = solve(&context, &method, &fixture.world, 0);

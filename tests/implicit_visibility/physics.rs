@@ -21,7 +21,7 @@ fn the_furnace_gains_half_of_each_bounce() {
     let fixture = Fixture::new(&context, builtin_scene("furnace"), Some(0.6));
     for frames in [Frames::World, Frames::Surface] {
         let method = fixture.linked(&context, Settings { bins: 16, frames, ..Settings::default() });
-        for bounces in 0..=6u32 {
+        for bounces in [0u32, 1, 2, 6] {
             let solution = solve(&context, &method, &fixture.world, bounces);
             let expected = PI / 2f32.powi(bounces as i32);
             let relative = |e: &Vec3| e.x / expected;
@@ -56,8 +56,7 @@ fn an_even_sky_gives_pi_times_its_radiance() {
     let plane = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 4, 0);
     let radiance = Vec3::new(0.5, 1.0, 2.0);
     let scene = scene(vec![one_sided(0.5)], vec![plane], &[]);
-    let pose = Pose::rest(&scene);
-    let fixture = Fixture::posed(&context, scene, None, Environment::Constant(radiance), &pose);
+    let fixture = Fixture::posed(&context, scene, None, Environment::Constant(radiance), Pose::rest);
     for (bins, frames, spin) in [(2, Frames::World, 0.0), (8, Frames::World, 30.0), (7, Frames::Surface, 0.0)] {
         let method = fixture.linked(&context, Settings { bins, frames, spin, ..Settings::default() });
         let solution = solve(&context, &method, &fixture.world, 1);

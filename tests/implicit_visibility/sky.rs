@@ -1,13 +1,12 @@
 //! A plane under a sky with a box on it: direct light against rays, by bins.
 
-use crate::common::scenes::{lambert, parallelogram, scene};
+use crate::common::scenes::{lambert, one_sided_box, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, solve, winners};
 use crate::twins;
 use glam::{Quat, Vec2, Vec3};
 use linklight::gpu::shaders::types::{Ray, Receiver};
 use linklight::methods::implicit_visibility::{Settings, bins};
-use linklight::scene::Primitive;
 use linklight::scene::environment::{Environment, EnvironmentMap};
 use linklight::scene::pose::Pose;
 use linklight::stages::trace::{self, Tracer};
@@ -25,18 +24,6 @@ fn sky() -> EnvironmentMap {
     EnvironmentMap { texels: (0..width * height).map(texel).collect(), ..blank }
 }
 
-fn one_sided_box(low: Vec3, high: Vec3, cells: u32) -> Vec<Primitive> {
-    let size = high - low;
-    let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
-    vec![
-        parallelogram(low + z, x, y, cells, 0),
-        parallelogram(low + x, -x, y, cells, 0),
-        parallelogram(low, z, y, cells, 0),
-        parallelogram(low + x + z, -z, y, cells, 0),
-        parallelogram(low + y + z, x, -z, cells, 0),
-    ]
-}
-
 #[test]
 fn the_sky_around_a_box_is_seen_the_better_the_more_bins() {
     let context = TestContext::new();
@@ -44,9 +31,8 @@ fn the_sky_around_a_box_is_seen_the_better_the_more_bins() {
     parts.push(parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 16, 0));
     let material = linklight::scene::Material { double_sided: false, ..lambert(Vec3::splat(0.5)) };
     let room = scene(vec![material], parts, &[]);
-    let pose = Pose::rest(&room);
     let map = sky();
-    let fixture = Fixture::posed(&context, room, None, Environment::Map(map.clone()), &pose);
+    let fixture = Fixture::posed(&context, room, None, Environment::Map(map.clone()), Pose::rest);
 
     // The reference: rays drawn by the cosine about each sampled element.
     const RAYS: usize = 4096;

@@ -13,7 +13,7 @@
 // updates group_walks[group_count], link_counts, unfinished[1] (1: a walk stopped)
 // writes held_senders[KINDS * capacity * group_count]   shared none
 // Differs from [Dong2007]: pairs are directed, and a pair is not queued but found by its receiver's walk; bent nodes are
-// refined further.
+// refined further, and receivers further than senders.
 layout(local_size_x = 16) in;
 layout(set = 0, binding = 0) uniform usamplerBuffer walk_texels;
 layout(set = 0, binding = 1, scalar) readonly buffer Surfels { Surfel surfels[]; };
@@ -34,7 +34,10 @@ layout(push_constant, scalar) uniform Params {
 } params;
 
 // How much more a sender counts where it is bent: there an ellipse is no good outline.
-const float BENT = 4.0;
+const float BENT = 1.0;
+// How much more a receiver counts than a sender: links are received at its middle, and what its leaves see by them is off
+// by its own size, a quarter of a bin at most.
+const float PARALLAX = 16.0;
 // What flat ones are foreshortened to at most: their ellipses reach beyond them at their rims, and steep ones far.
 const float STEEPEST = 0.5;
 
@@ -56,12 +59,15 @@ bool fits(float area, vec3 towards, float distance_there)
                   < 4.0 * params.refinement * largest * largest * largest * distance_there * distance_there;
 }
 
-// Of the discs of nodes, m2.
+// From a group to a sender: what is typical of its nodes. The nearest may be much nearer, but few are.
+float distance_to(vec3 offset, float radius) { return sqrt(max(dot(offset, offset) - radius * radius, 0.0)); }
+
+// Of the discs of nodes that receive, m2.
 float largest_area(uint first, uint count)
 {
     float extent = 0.0;
     for (uint k = first; k < first + count; ++k) extent = max(extent, surfels[k].extent);
-    return PI * extent * extent;
+    return PARALLAX * PI * extent * extent;
 }
 
 void main()
@@ -94,17 +100,17 @@ void main()
         bool is_dropped = is_below_horizon(receiver, Extents(facing.xyz, radius, thickness), offset);
 
         vec3 from_above = centre.xyz - above.centre;
-        float nearest_above = length(from_above) - above.radius;
+        float far_above = distance_to(from_above, above.radius);
         bool ends_above = !is_dropped && at.step >= at.left_from_above
-                          && (is_leaf || fits(shown_area(facing.xyz, sin_cone, facing.w, from_above), from_above, nearest_above));
+                          && (is_leaf || fits(shown_area(facing.xyz, sin_cone, facing.w, from_above), from_above, far_above));
         at.left_from_above = ends_above ? skip : at.left_from_above;
-        is_dropped = is_dropped || (ends_above && fits(area_above, from_above, nearest_above));  // that link comes down
+        is_dropped = is_dropped || (ends_above && fits(area_above, from_above, far_above));  // that link comes down
 
-        float nearest = length(offset) - own.radius;
-        bool is_refined = !is_leaf && !fits(shown_area(facing.xyz, sin_cone, facing.w, offset), offset, nearest);
-        float farthest = nearest + radius;
+        float far = distance_to(offset, own.radius);
+        bool is_refined = !is_leaf && !fits(shown_area(facing.xyz, sin_cone, facing.w, offset), offset, far);
+        float farthest = length(offset) + radius;
         bool may_fit = is_refined ? area * float(params.n * params.n) < 4.0 * params.refinement * farthest * farthest
-                                  : fits(area, offset, nearest);
+                                  : fits(area, offset, far);
         is_dropped = is_dropped || (!of_leaves && !may_fit);    // left to the children
 
         if (!is_dropped && !is_refined) {

@@ -8,6 +8,7 @@
 //   2, 3: half axes of its ellipse, conjugate to each other (m) | of a leaf: first corner; 4 * corner count + sides
 //         of a node without a plane: covariance of its points, xx, yy, zz (m2); xy, yz, zx (m2)
 //   4: of a leaf: its vertex (m); of a flat one: the vertex in units of the half axes, from the centre
+//      of a node without a plane: mean of its normals by area
 const uint SENDER_TEXELS = 5;
 // Of a receiver:
 //   0: where it receives (m) | how far it reaches above its own horizon (m)

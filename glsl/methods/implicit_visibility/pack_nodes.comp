@@ -37,8 +37,10 @@ void main()
         vec3 offset = vertex - s.centre;
         if (is_flat(s.thickness, s.radius)) vertex = vec3(dot(s.g1, offset), dot(s.g2, offset), 0.0);
     } else if (!has_plane(s.cos_cone)) {
-        first = moments[node].diagonal;
-        second = moments[node].mixed;
+        SurfelMoments m = moments[node];
+        first = m.diagonal;
+        second = m.mixed;
+        vertex = s.area > 0.0 ? m.across / s.area : vec3(0.0);
     }
     uint to = SENDER_TEXELS * node;
     sender_texels[to] = floatBitsToUint(vec4(s.centre, s.radius));
