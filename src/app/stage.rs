@@ -2,8 +2,8 @@
 
 use glam::{UVec2, Vec3};
 
-use super::cli::Rays;
-use super::render::{FreeCamera, RenderRequest};
+use super::cli::{Display, Rays};
+use super::render::{FreeCamera, RenderRequest, displays};
 use super::values::SceneSource;
 use super::{AppError, edits};
 use crate::gpu::{AccelerationStructure, Context};
@@ -14,7 +14,7 @@ use crate::scene::environment::Environment;
 use crate::scene::environment::load::{self as environment, EnvironmentLimits, EnvironmentSource};
 use crate::scene::geometry::Geometry;
 use crate::scene::pose::Pose;
-use crate::scene::tessellate::{Fineness, tessellate};
+use crate::scene::tessellate::{Fineness, Tessellation, tessellate};
 use crate::scene::{LoadOptions, Scene, animation, builtin, deform};
 use crate::stages::bvh::Bvh;
 use crate::stages::trace::Tracer;
@@ -229,7 +229,7 @@ pub fn load_scene(source: &SceneSource, context: &Context) -> Result<Scene, AppE
 /// with elements needs some by default, also on the large surfaces of a scene that has many small ones.
 fn flatten(scene: &Scene, request: &RenderRequest, max_bytes: u64) -> Result<(Geometry, Vec<Vec3>), AppError> {
     let geometry = Geometry::flatten(scene, max_bytes).map_err(AppError::failed)?;
-    let rest = Pose::rest(scene);
+    let (rest, vertices) = (Pose::rest(scene), geometry.vertex_count());
     let fineness = match request.elements {
         Some(target) => Fineness::Elements(target),
         // A method on an atlas cuts the surface itself.
@@ -242,5 +242,51 @@ fn flatten(scene: &Scene, request: &RenderRequest, max_bytes: u64) -> Result<(Ge
         }
     };
     let cut = tessellate(geometry, &rest, fineness, max_bytes).map_err(AppError::failed)?;
+    if displays(request.method).contains(&Display::Vertex)
+        && let Some(warning) = left_uncut(&cut, request.elements, vertices)
+    {
+        tracing::warn!("{warning}");
+    }
     Ok((cut.geometry, cut.rest_positions))
+}
+
+/// What to say where light is computed at vertices, fewer were asked for than the scene has, and large triangles stay whole.
+fn left_uncut(cut: &Tessellation, asked: Option<u32>, vertices: u32) -> Option<String> {
+    let asked = asked.filter(|&asked| asked <= vertices)?;
+    let start = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+    let [low, high] = cut.rest_positions.iter().fold(start, |[low, high], &p| [low.min(p), high.max(p)]);
+    let longest = cut.max_edge / low.distance(high);
+    (longest > DEFAULT_LONGEST_EDGE).then(|| {
+        format!(
+            "--elements {asked}: the scene has {vertices} vertices as it is, so none of its triangles is cut; some are \
+             {:.2} m long ({:.0} % of the scene), with light at their corners alone. Ask for well over {vertices} \
+             elements, or leave --elements away: then long edges are cut",
+            cut.max_edge,
+            100.0 * longest,
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cut(name: &str, fineness: Fineness) -> (u32, Tessellation) {
+        let scene = builtin::open(&format!("{}{name}", builtin::PREFIX), &LoadOptions::default()).unwrap();
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        (geometry.vertex_count(), tessellate(geometry, &Pose::rest(&scene), fineness, 1 << 30).unwrap())
+    }
+
+    #[test]
+    fn walls_that_stay_whole_are_named() {
+        let (vertices, few) = cut("gallery?triangles=20000", Fineness::Elements(500));
+        let said = left_uncut(&few, Some(500), vertices).unwrap();
+        for part in ["--elements 500", &format!("well over {vertices} elements"), "leave --elements away"] {
+            assert!(said.contains(part), "{part:?} is not in: {said}");
+        }
+        // Where they are cut, or nothing was asked for, or all triangles are small as they are, there is nothing to say.
+        assert_eq!(left_uncut(&few, Some(vertices + 1), vertices), None);
+        assert_eq!(left_uncut(&few, None, vertices), None);
+        assert_eq!(left_uncut(&Tessellation { max_edge: 0.01, ..few }, Some(500), vertices), None);
+    }
 }
