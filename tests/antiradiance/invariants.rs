@@ -87,9 +87,29 @@ fn validate(context: &TestContext, name: &str, fixture: &Fixture, settings: Sett
     let links = context.download_range(&method.links().pairs, 0..count).unwrap();
     println!("{name}: {} leaves, {} links, depth {}", leaves.len(), links.len(), hierarchy.plan.depth());
     assert_eq!(wrongly_covered(&nodes, &links), 0, "{name}");
+    bins_are_covered_once(context, name, &method);
     // The check finds a link lost, and one too many.
     assert!(wrongly_covered(&nodes, &links[1..]) > 0);
     assert!(wrongly_covered(&nodes, &[links.as_slice(), &links[..1]].concat()) > 0);
+}
+
+/// The energy bound of the unoccluded operator: along one bin, a flat sender of radiance 1 brings a flat receiver no more than
+/// what radiance 1 from all of the bin would.
+fn bins_are_covered_once(context: &TestContext, name: &str, method: &Antiradiance) {
+    let m = method.bins().bins.count();
+    let nodes = context.download(&method.hierarchy().nodes).unwrap();
+    let leaves = context.download(&method.hierarchy().leaves).unwrap();
+    let norms = context.download(&method.tables().cosine_norms).unwrap();
+    let held = |entry: u32| {
+        let shape = nodes[(entry / m) as usize].shape as usize;
+        let cosine = leaves.get(shape)?.normal.dot(method.bins().bins.directions[(entry % m) as usize]);
+        Some(twins::discrete_cosine(cosine, norms[shape], m))
+    };
+    let transfers = method.transfers().download(context).unwrap();
+    let most = transfers.iter().filter_map(|&(cell, entry, weight)| Some(weight * held(cell)? * held(entry)?));
+    let (largest, sum) = most.fold((0.0, 0.0), |(largest, sum): (f32, f32), own| (largest.max(own), sum + own));
+    println!("{name}: a bin is covered {largest:.4} times at most by one sender");
+    assert!(largest <= 1.02 && sum > 0.0, "{name}: {largest}");
 }
 
 #[test]

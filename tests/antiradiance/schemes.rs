@@ -8,7 +8,7 @@ use linklight::methods::antiradiance::{Scheme, Settings, growth_rate};
 #[test]
 fn both_schemes_agree_after_many_steps() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(1.2));
     for undershoot in [0.5, 1e9] {
         let base = Settings { undershoot, refinement: 3.0, ..settings(128) };
         let symmetric = Settings { scheme: Scheme::Symmetric, iterations: 100, ..base };
