@@ -134,7 +134,7 @@ fn furnished_room() -> Scene {
 fn parts_receive_what_rays_off_the_faces_say() {
     let context = TestContext::new();
     let room = furnished_room();
-    for (emitters, tolerance) in [(vec![0, 1, 2], 0.03), (vec![1], 0.06), (vec![2], 0.06)] {
+    for (emitters, tolerance) in [(vec![0, 1, 2], 0.01), (vec![1], 0.02), (vec![2], 0.02)] {
         let (sent, table) = row(&context, &room, &emitters, Settings::default(), 100_000);
         let total = table.iter().fold(Received::default(), |sum, r| Received {
             solved: sum.solved + r.solved,

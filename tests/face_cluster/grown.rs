@@ -24,6 +24,7 @@ pub struct Grown {
     pub tables: Tables,
     pub elements: Vec<FaceElement>,
     pub nodes: Vec<Vec<Vec3>>,
+    pub normals: Vec<Vec<Vec3>>,
     /// Per element and node: it is no matter of rounding.
     pub is_clear: Vec<Vec<bool>>,
     /// Per element, function and receiver node.
@@ -100,8 +101,9 @@ fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) ->
         means.extend(of_functions.iter().map(|&v| v as f32));
     }
     let is_clear = laid.iter().map(|laid| laid.is_clear.clone()).collect();
+    let normals = laid.iter().map(|laid| laid.normals.clone()).collect();
     let nodes = laid.into_iter().map(|laid| laid.places).collect();
-    Grown { context, fixture, method, tables, elements, nodes, is_clear, fits, means }
+    Grown { context, fixture, method, tables, elements, nodes, normals, is_clear, fits, means }
 }
 
 /// Six sides of `cells` x `cells` squares, welded, wound outwards.
@@ -130,6 +132,12 @@ impl Grown {
 
     pub fn read<T: bytemuck::Pod>(&self, buffer: &Buffer<T>) -> Vec<T> {
         self.context.download(buffer).unwrap()
+    }
+
+    /// As kernels store them: a signed byte an axis.
+    pub fn packed_normals(&self) -> Vec<u32> {
+        let byte = |v: f32| (v.clamp(-1.0, 1.0) * 127.0).round() as i32 as u32 & 0xff;
+        self.normals.iter().flatten().map(|n| byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16).collect()
     }
 
     pub fn pool(&self, element_count: usize, made_count: usize) -> Buffer<PoolCounters> {

@@ -50,6 +50,18 @@ fn check_nodes(g: &Grown, found: &[Vec3]) {
     assert!(compared * 2 > found.len(), "{compared} of {} are no matter of rounding", found.len());
 }
 
+/// Faces' normals, a signed byte an axis; one that is turned is noticed.
+fn check_normals(g: &Grown, found: &[u32]) {
+    let byte = |word: u32, k: u32| f32::from((word >> (8 * k)) as u8 as i8) / 127.0;
+    let is_clear: Vec<bool> = g.is_clear.iter().flatten().copied().collect();
+    let expected = g.normals.iter().flatten();
+    for ((&word, normal), _) in found.iter().zip(expected).zip(&is_clear).filter(|(_, is_clear)| **is_clear) {
+        let n = Vec3::new(byte(word, 0), byte(word, 1), byte(word, 2));
+        assert!(n.abs_diff_eq(*normal, 0.01), "{n}, expected {normal}");
+        assert!(!n.abs_diff_eq(-*normal, 0.01), "a turned normal is noticed");
+    }
+}
+
 /// What the kernels made of the functions of the elements that are no matter of rounding.
 fn check_fits(g: &Grown, fits: &[f32], means: &[f32]) {
     let clear = |found: &[f32], own: &[f32]| {
@@ -98,6 +110,7 @@ fn roots_and_children_are_made() {
     let roots = g.tables.instances.len();
     let rules = g.table(&g.tables.rules);
     let rule_nodes = g.tables.rules.len() / 2;
+    let node_normals = g.table(&vec![0u32; g.elements.len() * rule_nodes]);
     let fits = g.table(&vec![0f32; g.fits.len()]);
     let function_means = g.table(&vec![0f32; g.means.len()]);
     let (receiver_nodes, shooter_nodes) = (g.tables.receiver_nodes as u32, SHOOTER.nodes().len() as u32);
@@ -127,6 +140,7 @@ fn roots_and_children_are_made() {
             rules: &rules,
             elements: &elements,
             element_nodes: &nodes,
+            node_normals: &node_normals,
             fits: &fits,
             function_means: &function_means,
             pool: &pool,
@@ -162,6 +176,7 @@ fn roots_and_children_are_made() {
                 rules: &rules,
                 elements: &elements,
                 element_nodes: &nodes,
+                node_normals: &node_normals,
                 fits: &fits,
                 function_means: &function_means,
                 pool: &pool,
@@ -180,6 +195,7 @@ fn roots_and_children_are_made() {
     }
     check_elements(&g, &g.read(&elements), &wanted);
     check_nodes(&g, &g.read(&nodes));
+    check_normals(&g, &g.read(&node_normals));
     check_fits(&g, &g.read(&fits), &g.read(&function_means));
 }
 

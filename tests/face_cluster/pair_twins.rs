@@ -170,7 +170,7 @@ fn past_cluster(
 }
 
 /// Thresholds of light behind blocked rays that is looked for in the halves.
-const WORTH_LOOKING_ON: f64 = 5.0;
+const WORTH_LOOKING_ON: f64 = 2.0;
 
 /// Settings of a pass of light.
 #[derive(Clone, Copy)]
@@ -211,14 +211,15 @@ struct Reaching {
 }
 
 impl Reaching {
-    /// Takes away what is blocked, and decides; `split` where the error is too large.
+    /// Takes away what is blocked (`free`: shares of the nodes, of a small pair or another), and decides; `split` where the
+    /// error is too large.
     fn decided(
         mut self,
         (t, nodes): (&Tables, &[Vec3]),
         (a, shooter): (&FaceElement, Option<&FaceElement>),
         way: &Way,
-        free: impl Fn(usize) -> f64,
-        (split, node): (u32, usize),
+        free: impl Fn(bool) -> Vec<f64>,
+        split: u32,
     ) -> Outcome {
         let most = self.greatest.iter().copied().fold(0.0, f64::max);
         let stake = f64::from(a.most_albedo) * most / way.threshold;
@@ -233,7 +234,7 @@ impl Reaching {
             }
         }
         let is_small = stake <= 1.0;
-        let shares: Vec<f64> = (0..t.receiver_nodes).map(|r| free(if is_small { node } else { r })).collect();
+        let shares = free(is_small);
         if shares.iter().all(|&share| share == 0.0) {
             quotients.push(stake / WORTH_LOOKING_ON);
             return Outcome::new(if stake > WORTH_LOOKING_ON { split } else { DONE }, quotients);
@@ -265,11 +266,22 @@ impl Reaching {
     }
 }
 
+/// Shares of the nodes, of those that were asked: of the others, and of a small pair's, the mean.
+fn shares_of(asked: &[(usize, f64)], count: usize, is_small: bool) -> Vec<f64> {
+    let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len() as f64;
+    let all: Vec<f64> = asked.iter().map(|(_, share)| *share).collect();
+    let of = |r: usize| {
+        let own: Vec<f64> = asked.iter().filter(|(node, _)| *node == r).map(|(_, share)| *share).collect();
+        if own.is_empty() || is_small { mean(&all) } else { mean(&own) }
+    };
+    (0..count).map(of).collect()
+}
+
 /// `transport`: a shooter's light to a receiver, or which of them is to be split.               [Gobbetti2003 3.3]
 pub fn transport(
     t: &Tables,
     elements: &[FaceElement],
-    nodes: &[Vec<Vec3>],
+    (nodes, normals): (&[Vec<Vec3>], &[Vec<Vec3>]),
     unshot: &[Vec<Vec3>],
     [receiver, shooter]: [usize; 2],
     way: &Way,
@@ -336,31 +348,45 @@ pub fn transport(
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
     let turn = (a.cluster * 7 + b.cluster * 13) as usize;
     let passed = [[a.first_place, a.place_count], [b.first_place, b.place_count]];
-    let ray = |r: usize, k: usize| {
-        let x = nodes[receiver][r].as_dvec3();
-        let in_turn = (0..shooter_rule.len()).map(|e| (turn + k + e) % shooter_rule.len());
-        let ys: Vec<DVec3> = in_turn.map(|e| nodes[shooter][t.receiver_nodes + e].as_dvec3()).collect();
-        let above = ys.iter().find(|y| (**y - x).dot(a.axis_z.as_dvec3()) > 0.0);
-        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, *above.unwrap_or(&ys[ys.len() - 1]))
-    };
     let reaching = Reaching { at_nodes, least, greatest, channel };
-    let stake = f64::from(a.most_albedo) * reaching.greatest.iter().copied().fold(0.0, f64::max) / way.threshold;
-    let free = |r: usize| {
-        let rounds = if stake <= 1.0 { 1 } else { way.rays_per_node };
-        let first = if stake <= 1.0 { 0 } else { r };
-        (0..rounds).map(|round| ray(r, first + round * t.receiver_nodes)).sum::<f64>() / rounds as f64
+    let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
+    let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
+    let ray = |r: usize, s: usize| {
+        let (x, y) = (at(receiver, r).0, at(shooter, receivers + s).0);
+        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
+    };
+    // The first node, by turns, that a receiver node faces and that faces it.
+    let facing = |r: usize, k: usize| {
+        let (x, n) = at(receiver, r);
+        (0..shooters).map(|e| (turn + k + e) % shooters).find(|&s| {
+            let (y, m) = at(shooter, receivers + s);
+            (y - x).dot(n) > 0.0 && (x - y).dot(m) > 0.0
+        })
+    };
+    let free = |is_small: bool| -> Vec<f64> {
+        let wanted = if is_small { 1 } else { receivers * way.rays_per_node };
+        let node = |k: usize| if is_small { (turn + k) % receivers } else { k % receivers };
+        let turns = (0..receivers * way.rays_per_node).map(|k| (node(k), facing(node(k), k)));
+        let mut asked: Vec<(usize, f64)> = turns.filter_map(|(r, s)| Some((r, ray(r, s?)))).take(wanted).collect();
+        if asked.is_empty() {
+            let k = receivers * way.rays_per_node;
+            asked.push((node(k), ray(node(k), (turn + k + shooters - 1) % shooters)));
+        }
+        shares_of(&asked, receivers, is_small)
     };
     let split = match (can_split(a), can_split(b)) {
         (false, false) => DONE,
         (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
-    let mut outcome =
-        reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, (split, turn % t.receiver_nodes));
-    // Level with the receiver's plane single precision may take another node for a ray.
-    let (from, to) = (&nodes[receiver][..t.receiver_nodes], &nodes[shooter][t.receiver_nodes..]);
-    let is_level = |x: &Vec3, y: &Vec3| (*y - *x).dot(a.axis_z).abs() < 1e-5 * (*y - *x).length();
-    if from.iter().any(|x| to.iter().any(|y| is_level(x, y))) {
+    let mut outcome = reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, split);
+    // Level with a face single precision, and normals of a byte an axis, may take another node for a ray.
+    let is_level = |(x, n): (DVec3, DVec3), y: DVec3| (y - x).dot(n).abs() < 0.02 * (y - x).length();
+    let is_unclear = |r: usize, s: usize| {
+        let (x, y) = (at(receiver, r), at(shooter, receivers + s));
+        is_level(x, y.0) || is_level(y, x.0)
+    };
+    if (0..receivers).any(|r| (0..shooters).any(|s| is_unclear(r, s))) {
         outcome.quotients.push(1.0);
     }
     outcome
@@ -370,7 +396,7 @@ pub fn transport(
 pub fn transport_light(
     t: &Tables,
     a: &FaceElement,
-    nodes: &[Vec3],
+    (nodes, normals): (&[Vec3], &[Vec3]),
     light: &Light,
     way: &Way,
     [far, offset]: [f64; 2],
@@ -398,7 +424,7 @@ pub fn transport_light(
         greatest: greatest.clone(),
     };
     let passed = [[a.first_place, a.place_count], [0, 0]];
-    let free = |r: usize| {
+    let ray = |r: usize| {
         if greatest[r] <= 0.0 {
             return 0.0;
         }
@@ -407,6 +433,21 @@ pub fn transport_light(
         let (x, y) = (from + direction * offset, from + direction * distance.min(far));
         visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
     };
+    let receivers = t.receiver_nodes;
+    let first = a.cluster as usize % receivers;
+    let free = |is_small: bool| -> Vec<f64> {
+        let order = (0..receivers).map(|k| if is_small { (first + k) % receivers } else { k });
+        let faced = order.clone().filter(|&r| of(r).0.dot(normals[r].as_dvec3()) > 0.0);
+        let mut asked: Vec<usize> = faced.take(if is_small { 1 } else { receivers }).collect();
+        if asked.is_empty() {
+            asked.extend(order.take(1));
+        }
+        shares_of(&asked.iter().map(|&r| (r, ray(r))).collect::<Vec<_>>(), receivers, is_small)
+    };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
-    reaching.decided((t, nodes), (a, None), way, free, (split, a.cluster as usize % t.receiver_nodes))
+    let mut outcome = reaching.decided((t, nodes), (a, None), way, free, split);
+    if (0..receivers).any(|r| of(r).0.dot(normals[r].as_dvec3()).abs() < 0.02) {
+        outcome.quotients.push(1.0);
+    }
+    outcome
 }

@@ -73,7 +73,7 @@ fn the_furnace_gains_half_of_each_bounce() {
         for pass in &method.report().iterations {
             let share = pass.received[0] / pass.shot.unwrap()[0];
             println!("furnace, {}: {:.3} % of what is shot arrives", pass.name, 100.0 * share);
-            assert!((share - 1.0).abs() < 1e-2, "{}: {share}", pass.name);
+            assert!((share - 1.0).abs() < 5e-3, "{}: {share}", pass.name);
         }
         println!("furnace, {bounces} bounces: mean off by {:.3} %, a leaf by {:.3} %", 100.0 * error, 100.0 * worst);
         assert!(error.abs() < 1e-2, "{bounces} bounces: {error}");
@@ -395,7 +395,7 @@ fn what_is_shot_in_a_closed_room_arrives() {
     for pass in &fixture.solve(&context, settings, 3).report().iterations {
         let share = pass.received[0] / pass.shot.unwrap()[0];
         println!("{}: {:.3} W shot, {:.3} % of it arrives", pass.name, pass.shot.unwrap()[0], 100.0 * share);
-        assert!((share - 1.0).abs() < 1e-2, "{}: {share}", pass.name);
+        assert!((share - 1.0).abs() < 5e-3, "{}: {share}", pass.name);
     }
 }
 

@@ -187,6 +187,8 @@ fn laid(t: &Tables, e: &FaceElement, uv: DVec2) -> Vec<(DVec3, DVec3)> {
 /// The nodes of an element, and the share of its area that is not hidden.
 pub struct Nodes {
     pub places: Vec<Vec3>,
+    /// Of the faces there.
+    pub normals: Vec<Vec3>,
     pub share: f64,
     /// Per node: single precision finds the same place.
     pub is_clear: Vec<bool>,
@@ -196,12 +198,14 @@ pub struct Nodes {
 pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
     let side = if t.instances[e.instance as usize].is_back != 0 { -1.0 } else { 1.0 };
     let (mut places, mut free, mut is_clear, mut exposed) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+    let mut normals: Vec<DVec3> = Vec::new();
     for rule in t.rules_of(e) {
-        let (mut last, mut clear) = ((DVec3::ZERO, false), true);
+        let (mut last, mut clear, mut normal) = ((DVec3::ZERO, false), true, DVec3::ZERO);
         for k in 0..TRIES {
             let step = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2) * k as f64;
             let found = laid(t, e, (rule.uv.as_dvec2() + step).fract());
             clear &= found.iter().all(|(place, _)| place.distance(found[0].0) < 1e-4);
+            normal = side * found[0].1;
             last = (found[0].0, !is_hidden(t, found[0].0, side * found[0].1));
             exposed += f64::from(u8::from(last.1 && k == 0));
             if last.1 {
@@ -209,18 +213,22 @@ pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
             }
         }
         places.push(last.0);
+        normals.push(normal);
         free.push(last.1);
         is_clear.push(clear);
     }
     if let Some(seen) = free.iter().rposition(|&free| free) {
-        let seen = places[seen];
-        places.iter_mut().zip(&free).filter(|(_, free)| !**free).for_each(|(place, _)| *place = seen);
+        let seen = (places[seen], normals[seen]);
+        for k in (0..free.len()).filter(|&k| !free[k]) {
+            (places[k], normals[k]) = seen;
+        }
     }
     let share = (exposed / places.len() as f64).max(1.0 / 32.0);
     if share < 1.0 && !is_clear.iter().all(|&clear| clear) {
         is_clear.iter_mut().for_each(|clear| *clear = false);
     }
-    Nodes { places: places.iter().map(|p| p.as_vec3()).collect(), share, is_clear }
+    let single = |of: &[DVec3]| of.iter().map(|v| v.as_vec3()).collect();
+    Nodes { places: single(&places), normals: single(&normals), share, is_clear }
 }
 
 /// Where node `k` of an element counts as standing in its square.

@@ -81,15 +81,16 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
     if (is_face) corners_of(inst, e.first_place - inst.first_triangle, corners);
     uint hidden = 0;
     vec3 seen = e.center;
+    uint seen_normal = 0;
     float exposed = 0.0;
     [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k) {
         CubatureNode node = rules[is_face ? RULE_NODES + k : k];
-        vec3 place = vec3(0.0);
+        vec3 place = vec3(0.0), normal;
         bool is_free = false;
         [[dont_unroll]] for (uint t = 0; t < TRIES && !is_free; ++t) {
             // An even sequence of places, from the rule's on.                                  [Roberts2018]
             vec2 uv = fract(node.uv + float(t) * vec2(0.7548776662466927, 0.5698402909980532));
-            vec3 normal = side * e.axis_z;
+            normal = side * e.axis_z;
             if (is_face) {
                 if (uv.x + uv.y > 1.0) uv = 1.0 - uv;
                 place = corners[0] + uv.x * (corners[1] - corners[0]) + uv.y * (corners[2] - corners[0]);
@@ -100,14 +101,22 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
             is_free = !is_hidden(place, side * normal, ray_offset);
             if (t == 0 && is_free) exposed += 1.0;
         }
-        if (is_free) seen = place;
+        uint packed_normal = packSnorm4x8(vec4(side * normal, 0.0));
+        if (is_free) {
+            seen = place;
+            seen_normal = packed_normal;
+        }
         hidden |= is_free ? 0u : 1u << k;
         element_nodes[index * RULE_NODES + k] = place;
+        node_normals[index * RULE_NODES + k] = packed_normal;
     }
     // Where none was found for one, another's.
     if (bitCount(hidden) < RULE_NODES)
         [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k)
-            if ((hidden >> k & 1u) != 0) element_nodes[index * RULE_NODES + k] = seen;
+            if ((hidden >> k & 1u) != 0) {
+                element_nodes[index * RULE_NODES + k] = seen;
+                node_normals[index * RULE_NODES + k] = seen_normal;
+            }
     return max(exposed / float(RULE_NODES), LEAST_EXPOSED);
 }
 

@@ -1,6 +1,6 @@
 #ifndef FACE_CLUSTER_MAKE_ELEMENT
 #define FACE_CLUSTER_MAKE_ELEMENT
-// How an element comes to be: a cluster placed in the world. Bindings 0 to 14 of every kernel that makes elements. Nodes
+// How an element comes to be: a cluster placed in the world. Bindings 0 to 14 and 16 of every kernel that makes elements. Nodes
 // of the rules are those of the receiver, then the shooter's; rules on the square, then on a triangle.
 #include "lib/cluster_basis.glsl"
 #include "lib/face_element.glsl"
@@ -17,6 +17,7 @@ layout(set = 0, binding = 7, scalar) buffer Elements { FaceElement elements[]; }
 layout(set = 0, binding = 8, scalar) buffer Nodes { vec3 element_nodes[]; };                        // per element and rule node, metres
 layout(set = 0, binding = 9, scalar) buffer Pool { PoolCounters pool[]; };
 layout(set = 0, binding = 13, scalar) writeonly buffer Fits { float fits[]; };                      // per element, function and receiver node
+layout(set = 0, binding = 16, scalar) writeonly buffer Normals { uint node_normals[]; };            // per element and rule node: packSnorm4x8
 layout(set = 0, binding = 14, scalar) writeonly buffer FunctionMeans { float function_means[]; };   // per element and function
 layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;

@@ -1,6 +1,6 @@
 #ifndef FACE_CLUSTER_RECEIVE
 #define FACE_CLUSTER_RECEIVE
-// Bindings 0 to 12, 21 and set 1 of every kernel that decides pairs: whether light passes between two places, and what the
+// Bindings 0 to 12, 21, 23 and set 1 of every kernel that decides pairs: whether light passes between two places, and what the
 // receiver keeps of it. Faces of the two elements block nothing: what one side of a cluster does to the other is the
 // matter of its self transfer.
 #include "lib/bvh.glsl"
@@ -23,6 +23,7 @@ layout(set = 0, binding = 10, scalar) readonly buffer Skips { uint cluster_skips
 layout(set = 0, binding = 11, scalar) buffer Arriving { int arriving[]; };                          // per element, function, channel, axis
 layout(set = 0, binding = 12, scalar) buffer Pool { PoolCounters pool[]; };
 layout(set = 0, binding = 21, scalar) readonly buffer Rules { CubatureNode rules[]; };               // of the receiver, then the shooter: on the square, then on a triangle
+layout(set = 0, binding = 23, scalar) readonly buffer Normals { uint node_normals[]; };            // per element and rule node: packSnorm4x8
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
@@ -64,12 +65,14 @@ float visibility(FaceElement receiver, Ray ray)
 vec3 receiver_node(uint element, uint k) { return element_nodes[element * RULE_NODES + k]; }
 vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER_NODES + k); }
 
+// Of the face that the node lies on.
+vec3 node_normal(uint element, uint k) { return unpackSnorm4x8(node_normals[element * RULE_NODES + k]).xyz; }
+
 // Whether the element's cluster has smaller ones below it.
 bool can_split(FaceElement e) { return cluster_skips[e.cluster] != e.cluster + 1; }
 
-// Thresholds of light behind blocked rays that is looked for in the halves: where all rays were free, the like of it
-// passes unnoticed.
-const float WORTH_LOOKING_ON = 5.0;
+// Thresholds of light behind blocked rays that is looked for in the halves.
+const float WORTH_LOOKING_ON = 2.0;
 // Least vector area that stands for all of an element, as a share of its area.
 const float LEAST_FLAT_SHARE = 0.5;
 

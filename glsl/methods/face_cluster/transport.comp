@@ -118,23 +118,37 @@ void main()
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
     uint turn = a.cluster * 7u + b.cluster * 13u;
     float free[RECEIVER_NODES];
-    bool any_free = false;
-    uint ray_count = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) free[r] = 0.0;
-    [[dont_unroll]] for (uint k = 0; k < ray_count; ++k) {
-        uint r = is_small ? turn % RECEIVER_NODES : k % RECEIVER_NODES;
-        vec3 x = receiver_node(receiver, r), y;
-        // To a node above the receiver's plane, if there is one.
-        [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
-            y = shooter_node(shooter, (turn + k + e) % SHOOTER_NODES);
-            if (dot(y - x, a.axis_z) > 0.0) break;
+    uint rays_from[RECEIVER_NODES];
+    uint ray_count = 0, most_rays = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
+    float sum_free = 0.0;
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        free[r] = 0.0;
+        rays_from[r] = 0;
+    }
+    // Faces that look away say nothing of what the others see: first come nodes that face each other, then, where there
+    // are none at all, any.
+    [[dont_unroll]] for (uint k = 0; k < RECEIVER_NODES * (params.rays_per_node + 1) && ray_count < most_rays; ++k) {
+        uint r = (is_small ? turn + k : k) % RECEIVER_NODES;
+        bool is_any = k >= RECEIVER_NODES * params.rays_per_node;
+        if (is_any && ray_count > 0) break;
+        vec3 x = receiver_node(receiver, r), normal = node_normal(receiver, r), y;
+        bool faces = false;
+        [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES && !faces; ++e) {
+            uint s = RECEIVER_NODES + (turn + k + e) % SHOOTER_NODES;
+            y = receiver_node(shooter, s);
+            faces = dot(y - x, normal) > 0.0 && dot(x - y, node_normal(shooter, s)) > 0.0;
         }
-        Ray ray = Ray(x, 1e-4, y - x, 1.0 - 1e-4);
-        float share = visibility(a, ray);
-        any_free = any_free || share > 0.0;
-        free[r] += share / float(params.rays_per_node);
+        if (!faces && !is_any) continue;
+        float share = visibility(a, Ray(x, 1e-4, y - x, 1.0 - 1e-4));
+        free[r] += share;
+        sum_free += share;
+        ++rays_from[r];
+        ++ray_count;
     }
     atomicAdd(pool[0].rays, ray_count);
+    bool any_free = sum_free > 0.0;
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r)
+        free[r] = rays_from[r] > 0 && !is_small ? free[r] / float(rays_from[r]) : sum_free / float(max(ray_count, 1));
     uint split = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
     bool may_split = can_split(a) || can_split(b);
     if (!any_free) {
@@ -142,9 +156,7 @@ void main()
         if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = split;
         return;
     }
-    float only = free[turn % RECEIVER_NODES] * float(params.rays_per_node);
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        if (is_small) free[r] = only;
         at_nodes[r] *= free[r];
         if (free[r] < 0.999) least[r] = 0.0;
         if (free[r] == 0.0) greatest[r] = 0.0;

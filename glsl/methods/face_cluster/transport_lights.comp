@@ -55,27 +55,33 @@ void main()
         return;
     }
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
-    uint turn = a.cluster % RECEIVER_NODES;
-    bool any_free = false;
-    float free[RECEIVER_NODES];
-    [[dont_unroll]] for (uint k = 0; k < (is_small ? 1 : RECEIVER_NODES); ++k) {
-        uint r = is_small ? turn : k;
+    uint turn = a.cluster % RECEIVER_NODES, ray_count = 0;
+    float free[RECEIVER_NODES], sum_free = 0.0;
+    bool is_asked[RECEIVER_NODES];
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) is_asked[r] = false;
+    // As in transport: faces that look away say nothing of what the others see.
+    [[dont_unroll]] for (uint k = 0; k < 2 * RECEIVER_NODES && !(is_small && ray_count > 0); ++k) {
+        uint r = (is_small ? turn + k : k) % RECEIVER_NODES;
+        if (k >= RECEIVER_NODES && ray_count > 0) break;
         vec3 x = receiver_node(receiver, r), direction;
         float distance_to_light;
         light_irradiance(light, x, direction, distance_to_light);
+        if (dot(direction, node_normal(receiver, r)) <= 0.0 && k < RECEIVER_NODES) continue;
         Ray ray = Ray(x, params.ray_offset, direction, min(distance_to_light, params.far));
-        float share = greatest[r] > 0.0 ? visibility(a, ray) : 0.0;
-        any_free = any_free || share > 0.0;
-        free[r] = share;
+        free[r] = greatest[r] > 0.0 ? visibility(a, ray) : 0.0;
+        sum_free += free[r];
+        is_asked[r] = true;
+        ++ray_count;
     }
-    atomicAdd(pool[0].rays, is_small ? 1 : RECEIVER_NODES);
-    if (!any_free) {
+    atomicAdd(pool[0].rays, ray_count);
+    float mean_free = sum_free / float(max(ray_count, 1));
+    if (sum_free <= 0.0) {
         // As in transport: what may still be free is looked for where it is too much to lose.
         if (can_split(a) && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = SPLIT_RECEIVER;
         return;
     }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        float share = free[is_small ? turn : r];
+        float share = is_small || !is_asked[r] ? mean_free : free[r];
         at_nodes[r] *= share;
         if (share < 0.999) least[r] = 0.0;
         if (share == 0.0) greatest[r] = 0.0;

@@ -181,6 +181,7 @@ impl FaceClusters {
             rules: &s.rules,
             elements: &s.elements,
             element_nodes: &s.nodes,
+            node_normals: &s.normals,
             fits: &s.fits,
             function_means: &s.function_means,
             pool: &s.pool,

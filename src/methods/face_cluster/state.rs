@@ -19,6 +19,8 @@ pub struct State {
     pub elements: Buffer<FaceElement>,
     /// Per element and rule node, metres.
     pub(super) nodes: Buffer<Vec3>,
+    /// Per element and rule node: of the face there, a signed byte an axis.
+    pub(super) normals: Buffer<u32>,
     /// Per element, irradiance function and receiver node: how much of what arrives there the function gets.
     pub(super) fits: Buffer<f32>,
     /// Per element and irradiance function: its mean over the element's faces.
@@ -66,7 +68,7 @@ impl Shape {
         let element = size_of::<FaceElement>();
         let fits = 4 * self.irradiance * self.receiver_nodes;
         let widest = (12 * self.nodes).max(36 * self.irradiance).max(element).max(fits);
-        let all = element + 12 * self.nodes + 24 * self.radiosity + 112 * self.irradiance + fits + 4;
+        let all = element + 16 * self.nodes + 24 * self.radiosity + 112 * self.irradiance + fits + 4;
         (widest as u64, all as u64)
     }
 }
@@ -97,6 +99,7 @@ impl State {
             rules: context.upload("face-cluster/rules", &rules)?,
             elements: pool.elements,
             nodes: pool.nodes,
+            normals: pool.normals,
             fits: pool.fits,
             function_means: pool.function_means,
             unshot: pool.unshot,
@@ -123,6 +126,7 @@ impl State {
         let mut recorder = context.recorder("face-cluster")?;
         recorder.copy(&self.elements, &larger.elements);
         recorder.copy(&self.nodes, &larger.nodes);
+        recorder.copy(&self.normals, &larger.normals);
         recorder.copy(&self.fits, &larger.fits);
         recorder.copy(&self.function_means, &larger.function_means);
         recorder.copy(&self.unshot, &larger.unshot);
@@ -153,6 +157,7 @@ impl State {
         self.capacity = capacity;
         self.elements = tables.elements;
         self.nodes = tables.nodes;
+        self.normals = tables.normals;
         self.fits = tables.fits;
         self.function_means = tables.function_means;
         self.unshot = tables.unshot;
@@ -206,6 +211,7 @@ fn check(context: &Context, shape: Shape, capacity: u32) -> Result<(), FaceClust
 struct Tables {
     elements: Buffer<FaceElement>,
     nodes: Buffer<Vec3>,
+    normals: Buffer<u32>,
     fits: Buffer<f32>,
     function_means: Buffer<f32>,
     unshot: Buffer<Vec3>,
@@ -223,6 +229,7 @@ impl Tables {
         Ok(Self {
             elements: context.buffer(&buffer("elements"), capacity)?,
             nodes: context.buffer(&buffer("nodes"), capacity * shape.nodes)?,
+            normals: context.buffer(&buffer("normals"), capacity * shape.nodes)?,
             fits: context.buffer(&buffer("fits"), capacity * shape.irradiance * shape.receiver_nodes)?,
             function_means: context.buffer(&buffer("function means"), capacity * shape.irradiance)?,
             unshot: context.buffer(&buffer("unshot"), capacity * shape.radiosity)?,
