@@ -8,7 +8,7 @@ use glam::Vec3;
 use linklight::methods::face_cluster::rules::{Basis, Rule};
 use linklight::methods::face_cluster::{FaceClusterError, FaceClusters, Settings, Stage, Visibility};
 use linklight::scene::environment::Environment;
-use linklight::scene::{LightKind, Material};
+use linklight::scene::{Image, LightKind, Material, Texture, TextureRef, Wrap};
 use linklight::stages::work::{Interrupted, Watch};
 use std::f32::consts::PI;
 
@@ -399,19 +399,40 @@ fn what_is_shot_in_a_closed_room_arrives() {
     }
 }
 
-/// The floor of a closed box lit through a slit that few rays meet: what most rays do not see is not lost.
+/// The floor of a closed box lit through a slit that few rays meet: what most rays do not see is not lost, whether the
+/// slit is between two boards or a hole in one.
 #[test]
 fn light_through_a_slit_is_found() {
     let context = TestContext::new();
     let (x, z) = (Vec3::X, Vec3::Z);
-    let mut materials = vec![one_sided(0.5), one_sided(0.0), lambert(Vec3::ZERO)];
+    let mut materials = vec![one_sided(0.5), one_sided(0.0), lambert(Vec3::ZERO), lambert(Vec3::ZERO)];
     materials[1].emission = Vec3::splat(1.0);
-    let half = |from: f32, to: f32| parallelogram(Vec3::new(from, 0.5, 0.0), z, x * (to - from), 4, 2);
+    let slot = TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
+    (materials[3].base_color_texture, materials[3].alpha_cutoff) = (Some(slot), Some(0.5));
+    let board =
+        |from: f32, to: f32, material: u32| parallelogram(Vec3::new(from, 0.5, 0.0), z, x * (to - from), 4, material);
     let floor = parallelogram(Vec3::ZERO, z, x, 32, 0);
     let lamp = parallelogram(Vec3::Y, x, z, 8, 1);
     let slit = [0.3, 0.4];
-    let fixture =
-        Fixture::new(&context, scene(materials, vec![floor, lamp, half(0.0, slit[0]), half(slit[1], 1.0)], &[]), None);
+    let boards = vec![floor.clone(), lamp.clone(), board(0.0, slit[0], 2), board(slit[1], 1.0, 2)];
+    let boards = scene(materials.clone(), boards, &[]);
+    // One board in ten strips, the fourth of them a hole.
+    let mut masked = scene(materials, vec![floor, lamp, board(0.0, 1.0, 3)], &[]);
+    masked.images.push(Image {
+        name: "strips".into(),
+        width: 1,
+        height: 10,
+        rgba: (0..10).flat_map(|k| [255, 255, 255, if k == 3 { 0 } else { 255 }]).collect(),
+        srgb: true,
+    });
+    masked.textures.push(Texture {
+        image: 0,
+        wrap: [Wrap::ClampToEdge; 2],
+        mag_linear: false,
+        min_linear: false,
+        mipmapped: false,
+        mip_linear: false,
+    });
     // By brute force: places of the floor against places of the lamp, through the slit's height.
     let (cells, mut expected) = (96, 0.0f64);
     let at = |k: i32| (f64::from(k) + 0.5) / f64::from(cells);
@@ -425,9 +446,10 @@ fn light_through_a_slit_is_found() {
             }
         }
     }
-    let settings = Settings::default();
-    let method = fixture.solve(&context, settings, 0);
-    let (power, _) = received(&leaves(&context, &method), |e| e.albedo.x > 0.2);
-    println!("through a slit: {power} W, expected {expected} W");
-    assert!((power / expected - 1.0).abs() < 0.05, "{power} W, expected {expected} W");
+    for (name, scene) in [("between boards", boards), ("a hole in a board", masked)] {
+        let method = Fixture::new(&context, scene, None).solve(&context, Settings::default(), 0);
+        let (power, _) = received(&leaves(&context, &method), |e| e.albedo.x > 0.2);
+        println!("through a slit, {name}: {power} W, expected {expected} W");
+        assert!((power / expected - 1.0).abs() < 0.05, "{name}: {power} W, expected {expected} W");
+    }
 }
