@@ -130,32 +130,37 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
 
     direct_sum = indirect_sum = lost_sum = vec3(0.0);
     gathered_pixel = index;
-    uint node = 0, visited = 0, cut = 0, rays = 0, environment_taken = 0;
-    while (true) {
-        // Up to the next arrival that would bring light and needs a ray: threads in lockstep cast theirs together.
-        Arrival arrival;
-        bool found = false;
-        while (!found && node < params.node_count) {
-            uint taken = next_sender(node, params.node_count, visited);
-            if (taken == NO_SENDER) break;
-            ++cut;
-            float chance, free;
-            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)), chance);
-            found = is_worth_asking(arrival, chance);
-            if (found && is_told(origin, arrival.target, arrival.leaf, free)) {
-                take(arrival, free);
-                found = false;
+    uint node = 0, visited = 0, cut = 0, rays = 0, environment_taken = 0, most = 4;
+    do {
+        uint count = next_senders(most, node, params.node_count, visited), k = 0;
+        most = more_senders(most);
+        cut += count;
+        // The environment comes behind the last node.
+        uint environment_end = node < params.node_count ? 0 : params.environment_samples;
+        while (true) {
+            // Up to the next arrival that would bring light and needs a ray: threads in lockstep cast theirs together.
+            Arrival arrival;
+            bool found = false;
+            while (!found && k < count) {
+                uint taken = sender_batch[k++];
+                float chance, free;
+                arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 0u, params.seed)), chance);
+                found = is_worth_asking(arrival, chance);
+                if (found && is_told(origin, arrival.target, arrival.leaf, free)) {
+                    take(arrival, free);
+                    found = false;
+                }
             }
+            while (!found && environment_taken < environment_end) {
+                arrival = environment_arrival(environment_taken, pcg4d(uvec4(index, environment_taken, 1u, params.seed)));
+                ++environment_taken;
+                found = arrival.direct != vec3(0.0);
+            }
+            if (!found) break;
+            ++rays;
+            take(arrival, visibility(origin, arrival.target, arrival.leaf));
         }
-        while (!found && environment_taken < params.environment_samples) {
-            arrival = environment_arrival(environment_taken, pcg4d(uvec4(index, environment_taken, 1u, params.seed)));
-            ++environment_taken;
-            found = arrival.direct != vec3(0.0);
-        }
-        if (!found) break;
-        ++rays;
-        take(arrival, visibility(origin, arrival.target, arrival.leaf));
-    }
+    } while (node < params.node_count);
     direct[index] += params.weight * direct_sum;
     indirect[index] += params.weight * indirect_sum;
     gather_counts[index].cut_size += params.weight * float(cut);

@@ -14,21 +14,30 @@ const uint SENDER_REFINE = 2u;  // look at its children; a leaf is taken
 uint sender_decision(SenderNode node, bool is_leaf);
 uvec4 sender_branch_texel(uint i);
 
-// The next node of the cut at or after `node`, or NO_SENDER; moves `node` behind it. Ends for any table: every step
-// goes to a larger index.
-uint next_sender(inout uint node, uint node_count, inout uint visited)
+// Nodes of a cut that are gathered from together. Threads in lockstep walk until each has so many or is through, and then
+// gather: node by node all would wait for the slowest of them at each.
+const uint SENDER_BATCH = 32;
+uint sender_batch[SENDER_BATCH];
+
+// The next nodes of the cut at or after `node`, `most` of them, or fewer behind the last; moves `node` behind them. Ends for
+// any table: every step goes to a larger index.
+uint next_senders(uint most, inout uint node, uint node_count, inout uint visited)
 {
-    while (node < node_count) {
+    uint count = 0;
+    while (count < most && node < node_count) {
         SenderNode sender = sender_node(node);
-        uint index = node;
-        uint decision = sender_decision(sender, sender.skip == index + 1);
-        bool refine = decision == SENDER_REFINE && sender.skip != index + 1;
-        node = refine ? index + 1 : max(sender.skip, index + 1);
+        bool is_leaf = sender.skip == node + 1;
+        uint decision = sender_decision(sender, is_leaf);
+        bool refine = decision == SENDER_REFINE && !is_leaf;
+        if (decision != SENDER_IGNORE && !refine) sender_batch[count++] = node;
+        node = refine ? node + 1 : max(sender.skip, node + 1);
         ++visited;
-        if (decision != SENDER_IGNORE && !refine) return index;
     }
-    return NO_SENDER;
+    return count;
 }
+
+// How many follow on `most`: few at first, while a cut knows little of what the receiver will show.
+uint more_senders(uint most) { return min(2 * most, SENDER_BATCH); }
 
 // A leaf below `node`, drawn about in proportion to the power of the leaves, and the probability it is drawn with; `u` in
 // 0..1 is used up and left as new.

@@ -8,6 +8,8 @@
 
 // One thread per pixel of the cube maps of a chunk: both surfaces along its ray by one walk of our own traversal, and the
 // depths between them. What cube_rays, two closest hits, second_rays and intervals do, without their lists.
+// Differs from [Ritschel2008]: the second surface is the next one that is lit from this side, not the back of the first:
+// only such can be asked for, and thin bodies let depths hold longer.
 //                                                                                                [Ritschel2008 3.2]
 // reads map_origins, map_normals [place_count] (m, unit), the hierarchy and what tells its holes
 // writes intervals (low | high << 16) [chunk_count * 6 * resolution^2]   shared none
@@ -24,6 +26,7 @@ layout(push_constant, scalar) uniform Params {
     float codes_per_metre;
     float bias;             // in widths of a pixel
     float gap;              // of surfaces that count as two, m
+    uint lit_only;          // behind the first, surfaces that no light of this side falls on are never asked for
 } params;
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
@@ -42,6 +45,6 @@ void main()
         return;
     }
     Hit first, second;
-    traverse_both(Ray(map_origins[place], 0.0, direction, 3e38), params.gap, first, second);
+    traverse_both(Ray(map_origins[place], 0.0, direction, 3e38), params.lit_only != 0, params.gap, first, second);
     intervals[i] = depth_interval(first, second, params.codes_per_metre, params.bias * 2.0 / float(params.resolution));
 }

@@ -30,4 +30,10 @@ bool is_hole(uint triangle, vec2 barycentrics)
     }
     return false;
 }
+
+bool is_lit_side(uint triangle, bool is_back)
+{
+    uint flags = materials[triangle_materials[triangle]].flags;
+    return (flags & UNLIT) == 0 && (!is_back || (flags & DOUBLE_SIDED) != 0);
+}
 #endif

@@ -9,7 +9,7 @@ use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::lightmap::{Lightmap, TexelLight};
 use linklight::display::shadow_maps::ShadowMaps;
-use linklight::scene::atlas::{Atlas, NO_TEXEL};
+use linklight::scene::atlas::{Atlas, NO_TEXEL, Size};
 use linklight::scene::camera::Lens;
 use linklight::scene::deform::world_vertices;
 use linklight::stages::film::Film;
@@ -77,7 +77,7 @@ fn lightmap_agrees_with_its_twin() {
     case.pose.lights.clear();
     let random = &mut Random(31);
     let positions = world_vertices(&case.geometry, &case.pose).positions;
-    let atlas = Atlas::new(&case.scene, &case.geometry, &positions, 48).unwrap();
+    let atlas = Atlas::new(&case.scene, &case.geometry, &positions, Size::tight(48)).unwrap();
     let mut values = || -> Vec<Vec3> {
         atlas.texels.iter().map(|_| Vec3::new(random.unit(), random.unit(), 3.0 * random.unit())).collect()
     };

@@ -9,7 +9,7 @@ use linklight::display::shadow_maps::ShadowMaps;
 use linklight::gpu::Context;
 use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps};
 use linklight::report::tonemap::ToneSettings;
-use linklight::scene::atlas::Atlas;
+use linklight::scene::atlas::{Atlas, Size};
 use linklight::scene::camera::View;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
@@ -76,7 +76,7 @@ impl Fixture {
     }
 
     pub fn atlas(&self, resolution: u32) -> Atlas {
-        Atlas::new(&self.scene, &self.geometry, &self.positions, resolution).unwrap()
+        Atlas::new(&self.scene, &self.geometry, &self.positions, Size::tight(resolution)).unwrap()
     }
 
     pub fn map_input<'a>(&'a self, atlas: &'a Atlas, cache: Option<&'a Path>) -> MapInput<'a> {

@@ -14,6 +14,7 @@ use std::f32::consts::PI;
 
 const SMALL: Settings = Settings {
     atlas_resolution: 32,
+    atlas_gutter: 0,
     map_resolution: 16,
     sequence: linklight::stages::surface_maps::Sequence::Spiral,
     map_bias: 1.0,

@@ -39,6 +39,8 @@ vec4 sample_texture(TextureSlot slot, vec2 uv) { return textureLod(textures[nonu
 // Places of the faces that block nothing: first and count of the receiver and of the shooter.
 uvec4 passed_places = uvec4(0);
 
+bool is_lit_side(uint triangle, bool is_back) { return true; }
+
 bool is_hole(uint triangle, vec2 barycentrics)
 {
     uint place = triangle_places[triangle];

@@ -56,22 +56,25 @@ void gather_texel()
 
     vec3 origin = texel.position + params.ray_offset * texel.normal;
     vec3 sum = vec3(0.0);
-    uint node = 0, visited = 0, cut = 0;
-    while (true) {
-        Arrival arrival;
-        bool found = false;
-        while (!found && node < params.node_count) {
-            uint taken = next_sender(node, params.node_count, visited);
-            if (taken == NO_SENDER) break;
-            ++cut;
-            float chance;
-            arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 2u, params.seed)), chance);
-            found = is_worth_asking(arrival, chance);
+    uint node = 0, visited = 0, cut = 0, most = 4;
+    while (node < params.node_count) {
+        uint count = next_senders(most, node, params.node_count, visited), k = 0;
+        most = more_senders(most);
+        cut += count;
+        while (true) {
+            Arrival arrival;
+            bool found = false;
+            while (!found && k < count) {
+                uint taken = sender_batch[k++];
+                float chance;
+                arrival = arrival_of(taken, pcg4d(uvec4(index, taken, 2u, params.seed)), chance);
+                found = is_worth_asking(arrival, chance);
+            }
+            if (!found) break;
+            vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);
+            sum += light;
+            start_showing(shown_luminance + luminance(light));
         }
-        if (!found) break;
-        vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);
-        sum += light;
-        start_showing(shown_luminance + luminance(light));
     }
     irradiance[index] = PI * sum;
     cut_sizes[index] = cut;

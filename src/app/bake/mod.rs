@@ -40,11 +40,12 @@ use super::stage::Stage;
 use super::{AppError, measure, output};
 use crate::gpu::Context;
 use crate::gpu::shaders::types::ArrivingLight;
+use crate::methods::settings::Assignment;
 use crate::report::image::{self, Picture};
 use crate::report::trace::TimeLine;
 use crate::report::write::{check_writable, write_bytes};
 use crate::scene::Image;
-use crate::scene::atlas::{Atlas, NO_TEXEL};
+use crate::scene::atlas::{Atlas, NO_TEXEL, Size};
 use crate::scene::deform::{self, WorldVertices};
 use crate::stages::arriving_light::{self, Surroundings, irradiance_vectors};
 use crate::stages::surface_maps::map_offset;
@@ -78,7 +79,12 @@ pub fn run(
     let exr = args.output.with_extension("exr");
     check_writable(&args.output)?;
     [&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| check_writable(path))?;
-    let plan = Plan { methods: vec![args.method], variations: &[], set: &args.set, options: &args.options, global };
+    let mut set = args.set.clone();
+    if args.method.key == "surface-shadow-maps" && !set.iter().any(|set| set.key == "atlas_gutter") {
+        // Other programs filter over charts' borders.
+        set.push(Assignment { key: "atlas_gutter".into(), value: "1".into() });
+    }
+    let plan = Plan { methods: vec![args.method], variations: &[], set: &set, options: &args.options, global };
     plan.check()?;
     let request = plan.run(&args.scene, args.method, &[], &exr)?.request;
     let run = RenderRequest { profile: args.profile.clone(), trace: args.trace.clone(), ..request };
@@ -178,8 +184,11 @@ impl Bake<'_> {
         }
         let (scene, geometry, positions) = (&stage.scene, &stage.geometry, &vertices.positions);
         let atlas = match self.args.lightmap_size {
-            Some(size) => Atlas::new(scene, geometry, positions, size),
-            None => Atlas::fitting(scene, geometry, positions, LIGHTMAP_SIZES[0], LIGHTMAP_SIZES[1]),
+            Some(resolution) => Atlas::new(scene, geometry, positions, Size { resolution, gutter: 1 }),
+            None => {
+                let least = Size { resolution: LIGHTMAP_SIZES[0], gutter: 1 };
+                Atlas::fitting(scene, geometry, positions, least, LIGHTMAP_SIZES[1])
+            }
         };
         let atlas = atlas.map_err(|error| {
             let advice = error.to_string().replace("atlas_resolution=", "--lightmap-size ").replace("set --", "use --");

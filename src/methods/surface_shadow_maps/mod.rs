@@ -34,7 +34,7 @@ use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::methods::pick::Pick;
 use crate::report::tonemap::ToneSettings;
 use crate::scene::Scene;
-use crate::scene::atlas::{Atlas, AtlasError};
+use crate::scene::atlas::{Atlas, AtlasError, Size};
 use crate::scene::geometry::Geometry;
 use crate::scene::pose::Pose;
 use crate::stages::bvh::{Bvh, BvhError};
@@ -68,6 +68,8 @@ crate::settings! {
     pub struct Settings {
         /// Texels a side of the atlas; 0 takes as many as the scene's charts ask for, from 64 to 256.
         atlas_resolution: u32 = 0, range 0..=2048, unit "texels", paper "32 to 128";
+        /// Free texels between charts, for other programs that filter the atlas; nothing here needs any.
+        atlas_gutter: u32 = 0, range 0..=8, unit "texels", paper "not given";
         /// Pixels a side of a depth cube map's face.
         map_resolution: u32 = 32, range 4..=256, unit "pixels", paper "32 or 64";
         /// How the texels are walked when maps are compressed.
@@ -230,7 +232,7 @@ impl SurfaceShadowMaps {
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, SurfaceShadowMapsError> {
         let apart = Apart::of(context, stage, &settings)?;
         let positions = if apart.is_some() { stage.rest_positions } else { stage.positions };
-        let mut atlas = make_atlas(stage, positions, settings.atlas_resolution)?;
+        let mut atlas = make_atlas(stage, positions, &settings)?;
         // Maps of objects apart hold in every pose, and so must all that they are measured by.
         let bounds = if apart.is_some() { bounds_of(stage.rest_positions) } else { stage.bounds };
         let ray_offset = map_offset(bounds);
@@ -357,10 +359,11 @@ fn bounds_of(positions: &[Vec3]) -> [Vec3; 2] {
     positions.iter().fold([Vec3::MAX, Vec3::MIN], |[low, high], &p| [low.min(p), high.max(p)])
 }
 
-fn make_atlas(stage: &Stage<'_>, positions: &[Vec3], resolution: u32) -> Result<Atlas, AtlasError> {
-    match resolution {
-        0 => Atlas::fitting(stage.scene, stage.geometry, positions, 64, 256),
-        given => Atlas::new(stage.scene, stage.geometry, positions, given),
+fn make_atlas(stage: &Stage<'_>, positions: &[Vec3], settings: &Settings) -> Result<Atlas, AtlasError> {
+    let size = |resolution| Size { resolution, gutter: settings.atlas_gutter };
+    match settings.atlas_resolution {
+        0 => Atlas::fitting(stage.scene, stage.geometry, positions, size(64), 256),
+        given => Atlas::new(stage.scene, stage.geometry, positions, size(given)),
     }
 }
 
@@ -374,12 +377,12 @@ fn make_maps(
 ) -> Result<PlacedMaps, SurfaceShadowMapsError> {
     let options =
         MapOptions { resolution: settings.map_resolution, sequence: settings.sequence, bias: settings.map_bias };
-    let holes: Vec<u8> = hole_content(stage.scene);
+    let sides = side_content(stage);
     let shapes = apart.map_or_else(
         || bytemuck::cast_slice(stage.positions).to_vec(),
         |apart| moving::content(apart, stage.rest_positions),
     );
-    let content = [&shapes[..], bytemuck::cast_slice(&stage.geometry.triangles), &holes];
+    let content = [&shapes[..], bytemuck::cast_slice(&stage.geometry.triangles), &sides];
     let tracers = apart.map(|apart| apart.tracers(stage)).unwrap_or_default();
     let texel_objects = apart.map(|apart| texel_objects(atlas, &apart.objects)).unwrap_or_default();
     let input = MapInput {
@@ -402,15 +405,18 @@ fn make_maps(
     Ok(PlacedMaps { moving, ..placed })
 }
 
-/// What decides which rays pass through holes: cutoffs and textures of masked materials.
-fn hole_content(scene: &Scene) -> Vec<u8> {
+/// What decides which rays pass through holes, and which sides of surfaces reflect light: materials, and where they are.
+fn side_content(stage: &Stage<'_>) -> Vec<u8> {
     let mut content = Vec::new();
-    for material in &scene.materials {
+    for material in &stage.scene.materials {
+        content.extend([u8::from(material.double_sided), u8::from(material.unlit)]);
         content.extend(material.alpha_cutoff.unwrap_or(-1.0).to_le_bytes());
         if material.alpha_cutoff.is_some() {
             content.extend(format!("{material:?}").bytes());
         }
     }
+    let of_triangle = |&part: &u32| stage.geometry.parts[part as usize].material.to_le_bytes();
+    content.extend(stage.geometry.triangle_part.iter().flat_map(of_triangle));
     content
 }
 

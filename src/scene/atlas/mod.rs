@@ -27,6 +27,22 @@ fn cells_a_side(resolution: u32) -> u32 {
     (1024 / resolution.max(1)).clamp(1, 4)
 }
 
+/// How large an atlas is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Texels a side.
+    pub resolution: u32,
+    /// Free texels between charts: for filters that do not know what belongs to which.
+    pub gutter: u32,
+}
+
+impl Size {
+    /// Charts side by side.
+    pub fn tight(resolution: u32) -> Self {
+        Self { resolution, gutter: 0 }
+    }
+}
+
 /// Why a surface has no atlas.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum AtlasError {
@@ -89,8 +105,9 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// Unwraps and cuts `geometry`, whose vertices stand at `positions`, into at most `resolution` texels a side.
-    pub fn new(scene: &Scene, geometry: &Geometry, positions: &[Vec3], resolution: u32) -> Result<Self, AtlasError> {
+    /// Unwraps and cuts `geometry`, whose vertices stand at `positions`, into at most `size.resolution` texels a side.
+    pub fn new(scene: &Scene, geometry: &Geometry, positions: &[Vec3], size: Size) -> Result<Self, AtlasError> {
+        let Size { resolution, gutter } = size;
         let charts = unwrap(&Surface::of(geometry, positions), &Options::default());
         let has_back = |chart: usize| {
             let part = geometry.parts[charts.charts[chart].part as usize];
@@ -100,30 +117,30 @@ impl Atlas {
         let backs: Vec<usize> = (0..count).filter(|&chart| has_back(chart)).collect();
         let sizes: Vec<Vec2> =
             (0..count).chain(backs.iter().copied()).map(|chart| charts.charts[chart].size.max(Vec2::ZERO)).collect();
-        let packing = pack::pack(&sizes, resolution).ok_or_else(|| {
+        let packing = pack::pack(&sizes, resolution, gutter).ok_or_else(|| {
             let finer = std::iter::successors(Some(resolution.max(1).next_power_of_two()), |r| Some(r * 2));
-            let fits = finer.take_while(|&r| r <= MAX_RESOLUTION).find(|&r| pack::pack(&sizes, r).is_some());
+            let fits = finer.take_while(|&r| r <= MAX_RESOLUTION).find(|&r| pack::pack(&sizes, r, gutter).is_some());
             AtlasError::TooSmall { charts: sizes.len(), resolution, fits }
         })?;
         let mut back_of = vec![None; count];
         for (index, &chart) in backs.iter().enumerate() {
-            back_of[chart] = Some(packing.places[count + index]);
+            back_of[chart] = Some(packing.origin(count + index));
         }
         Ok(Self::cut(geometry, positions, &charts, &packing, &back_of, resolution))
     }
 
-    /// The coarsest atlas, of `least` texels a side or twice, four times ... as many, whose charts have some texels each
+    /// The coarsest atlas, as large as `least` or twice, four times ... as many, whose charts have some texels each
     /// in the mean; beyond `enough` any that the charts fit into will do.
     pub fn fitting(
         scene: &Scene,
         geometry: &Geometry,
         positions: &[Vec3],
-        least: u32,
+        least: Size,
         enough: u32,
     ) -> Result<Self, AtlasError> {
-        let mut resolution = least;
+        let mut resolution = least.resolution;
         loop {
-            match Self::new(scene, geometry, positions, resolution) {
+            match Self::new(scene, geometry, positions, Size { resolution, ..least }) {
                 Ok(atlas)
                     if resolution >= enough || atlas.texels.len() >= TEXELS_PER_CHART * atlas.chart_count as usize =>
                 {
@@ -140,7 +157,7 @@ impl Atlas {
         positions: &[Vec3],
         charts: &Charts,
         packing: &Packing,
-        back_of: &[Option<UVec2>],
+        back_of: &[Option<Vec2>],
         resolution: u32,
     ) -> Self {
         let count = charts.charts.len() as u32;
@@ -152,9 +169,8 @@ impl Atlas {
             let chart = charts.triangle_chart[triangle] as usize;
             let [a, b, c] = corners.map(|v| positions[v as usize]);
             let area = 0.5 * (b - a).cross(c - a).length();
-            let front = charts.corner_uv[triangle].map(|uv| uv * packing.scale + packing.places[chart].as_vec2());
-            let back =
-                back_of[chart].map(|place| charts.corner_uv[triangle].map(|uv| uv * packing.scale + place.as_vec2()));
+            let front = charts.corner_uv[triangle].map(|uv| uv * packing.scale + packing.origin(chart));
+            let back = back_of[chart].map(|place| charts.corner_uv[triangle].map(|uv| uv * packing.scale + place));
             atlas.corner_places[0].push(front);
             atlas.corner_places[1].push(back.unwrap_or(front));
             let sides = std::iter::once((front, chart as u32)).chain(back.map(|back| (back, count + chart as u32)));
@@ -341,7 +357,7 @@ mod tests {
             let [a, b, c] = t.map(|v| positions[v as usize]);
             0.5 * (b - a).cross(c - a).length()
         };
-        let atlas = Atlas::new(&scene, &geometry, &positions, resolution).unwrap();
+        let atlas = Atlas::new(&scene, &geometry, &positions, Size { resolution, gutter: 1 }).unwrap();
         let sides = |t: usize| 1.0 + f32::from(u8::from(atlas.corner_places[0][t] != atlas.corner_places[1][t]));
         let total = geometry.triangles.iter().enumerate().map(|(t, v)| sides(t) * area(v)).sum();
         (atlas, total)
@@ -379,10 +395,10 @@ mod tests {
         let scene = builtin::open("builtin:office", &LoadOptions::default()).unwrap();
         let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
         let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
-        let error = Atlas::new(&scene, &geometry, &positions, 16).unwrap_err();
+        let error = Atlas::new(&scene, &geometry, &positions, Size::tight(16)).unwrap_err();
         println!("{error}");
         let AtlasError::TooSmall { fits: Some(fits), .. } = error else { panic!("{error}") };
-        let atlas = Atlas::new(&scene, &geometry, &positions, fits).unwrap();
+        let atlas = Atlas::new(&scene, &geometry, &positions, Size::tight(fits)).unwrap();
         println!("office at {fits}: {} texels, {} charts", atlas.texels.len(), atlas.chart_count);
         assert!(error.to_string().contains(&format!("atlas_resolution={fits}")));
     }

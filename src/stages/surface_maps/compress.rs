@@ -23,9 +23,10 @@ impl Interval {
         (self.low..=self.high).contains(&depth)
     }
 
-    /// In the middle: as far as can be from both surfaces.
+    /// Behind the first surface by half a pixel's width of a fine map, or in the middle where the second is nearer: what
+    /// stands between both beside the pixel's ray is hidden.
     fn depth(self) -> u16 {
-        self.low.midpoint(self.high)
+        self.low.midpoint(self.high).min(self.low.saturating_add(self.low / 64 + 1))
     }
 
     fn intersection(self, other: Self) -> Option<Self> {

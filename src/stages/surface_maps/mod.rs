@@ -1,7 +1,8 @@
 //! Coherent surface shadow maps: from every texel of an atlas, depth in all directions, compressed; whether a texel sees
 //! a point is a look-up.                                                                   [Ritschel2008 3]
 //!
-//! Two rays per pixel find the first surface and the next; any depth in between answers every query right. The texels
+//! Two rays per pixel find the first surface and the next that may be asked for: which is lit from this side. Any depth in
+//! between answers every query right; taken is one close behind the first, where thin things beside the ray are. The texels
 //! are walked so that neighbours see nearly the same ([`sequence`]), and along the walk each pixel keeps one depth for as
 //! long as it holds. The maps are made chunk by chunk, can be interrupted between chunks, and are kept on disk.
 //!
@@ -169,7 +170,9 @@ impl SurfaceMaps {
                 if let (Some(Found::Damaged(reason)), Some(folder)) = (&found, input.cache) {
                     tracing::warn!("{} is damaged ({reason}); made anew", key.file_in(folder).display());
                 }
-                let maker = Maker { context, legs: legs(&input, &order), options, codes_per_metre, gap: offset };
+                let lit_only = input.apart.is_none();
+                let maker =
+                    Maker { context, legs: legs(&input, &order), options, codes_per_metre, gap: offset, lit_only };
                 let maps = maker.make(&origins, &normals, watch)?;
                 ray_count = 2 * maps.pixel_count() as u64 * u64::from(maps.place_count);
                 if let Some(folder) = input.cache
@@ -273,7 +276,8 @@ pub fn uncompressed(
     let frame = Placement::new(&input, order);
     let mut all = Vec::new();
     let (legs, codes_per_metre) = (legs(&input, order), frame.codes_per_metre);
-    let maker = Maker { context, legs, options, codes_per_metre, gap: frame.offset };
+    let lit_only = input.apart.is_none();
+    let maker = Maker { context, legs, options, codes_per_metre, gap: frame.offset, lit_only };
     maker.intervals(&frame.origins, &frame.normals, watch, |maps, _| {
         all.extend_from_slice(maps);
         Ok(())
@@ -331,6 +335,8 @@ struct Maker<'a> {
     codes_per_metre: f32,
     /// How far behind a surface the next is sought, metres.
     gap: f32,
+    /// The next is one that is lit from this side: what stands apart may be anywhere else, and is asked for too.
+    lit_only: bool,
 }
 
 /// Buffers of a chunk.
@@ -448,6 +454,7 @@ impl Maker<'_> {
                         codes_per_metre,
                         bias,
                         gap: self.gap,
+                        lit_only: u32::from(self.lit_only),
                     },
                     constants: passes::DepthsConstants { alpha_test: surfaces.has_holes },
                 };

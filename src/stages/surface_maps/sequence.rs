@@ -201,6 +201,7 @@ impl NearestLeft {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::atlas::Size;
     use crate::scene::geometry::Geometry;
     use crate::scene::pose::Pose;
     use crate::scene::{LoadOptions, builtin, deform};
@@ -209,7 +210,7 @@ mod tests {
         let scene = builtin::open("builtin:cornell-box", &LoadOptions::default()).unwrap();
         let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
         let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
-        Atlas::new(&scene, &geometry, &positions, 64).unwrap()
+        Atlas::new(&scene, &geometry, &positions, Size::tight(64)).unwrap()
     }
 
     #[test]
