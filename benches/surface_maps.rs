@@ -96,7 +96,8 @@ fn making(
 ) -> SurfaceMaps {
     let resolution = settings.map_resolution;
     let input = MapInput { atlas: &method.atlas, tracer: *tracer, apart: None, bounds, content: &[], cache: None };
-    let options = MapOptions { resolution, sequence: settings.sequence, bias: settings.map_bias };
+    let options =
+        MapOptions { resolution, sequence: settings.sequence, bias: settings.map_bias, until: settings.map_until };
     let start = Instant::now();
     let made = SurfaceMaps::new(context, input, options, &Unwatched).unwrap();
     let spent = start.elapsed().as_secs_f64();

@@ -8,8 +8,8 @@
 
 // One thread per pixel of the cube maps of a chunk: both surfaces along its ray by one walk of our own traversal, and the
 // depths between them. What cube_rays, two closest hits, second_rays and intervals do, without their lists.
-// Differs from [Ritschel2008]: the second surface is the next one that is lit from this side, not the back of the first:
-// only such can be asked for, and thin bodies let depths hold longer.
+// Differs from [Ritschel2008]: where it is asked for, the second surface is the next one that is lit from this side, not the
+// back of a thin body: only such can be asked for, and depths hold longer.
 //                                                                                                [Ritschel2008 3.2]
 // reads map_origins, map_normals [place_count] (m, unit), the hierarchy and what tells its holes
 // writes intervals (low | high << 16) [chunk_count * 6 * resolution^2]   shared none

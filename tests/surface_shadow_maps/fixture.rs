@@ -17,7 +17,7 @@ use linklight::scene::pose::Pose;
 use linklight::scene::{LoadOptions, Scene, builtin, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
-use linklight::stages::surface_maps::{MapInput, MapOptions, Sequence};
+use linklight::stages::surface_maps::{MapInput, MapOptions, MapUntil, Sequence};
 use linklight::stages::trace::Tracer;
 use linklight::stages::work::{Unwatched, Watch};
 use linklight::stages::world::World;
@@ -147,5 +147,5 @@ impl Fixture {
 }
 
 pub fn options(resolution: u32, sequence: Sequence) -> MapOptions {
-    MapOptions { resolution, sequence, bias: 1.0 }
+    MapOptions { resolution, sequence, bias: 1.0, until: MapUntil::Next }
 }

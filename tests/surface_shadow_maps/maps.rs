@@ -6,7 +6,7 @@ use glam::Vec3;
 use linklight::gpu::shaders::types::SurfaceMapQuery;
 use linklight::scene::environment::Environment;
 use linklight::stages::surface_maps::{
-    Interval, MapFilter, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed,
+    Interval, MapFilter, MapOptions, MapUntil, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed,
 };
 use linklight::stages::work::{Interrupted, Unwatched, Watch};
 
@@ -26,13 +26,14 @@ fn every_compressed_depth_answers_like_the_uncompressed_map() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
     let atlas = fixture.atlas(32);
-    for walk in SEQUENCES {
+    for (walk, until) in SEQUENCES.into_iter().flat_map(|walk| [(walk, MapUntil::Next), (walk, MapUntil::Lit)]) {
+        let options = |resolution, walk| MapOptions { until, ..options(resolution, walk) };
         let order = sequence::walk(&atlas, walk);
         let input = fixture.map_input(&atlas, None);
         let maps = SurfaceMaps::new(&context, input, options(8, walk), &Unwatched).unwrap();
         let intervals = uncompressed(&context, input, options(8, walk), &order, &Unwatched).unwrap();
         assert_eq!(intervals.len(), order.len() * maps.maps.pixel_count());
-        println!("{walk:?}: {} texels, {:.2} : 1", order.len(), maps.ratio());
+        println!("{walk:?}, {until:?}: {} texels, {:.2} : 1", order.len(), maps.ratio());
         assert_eq!(first_wrong(&maps, &intervals), None);
         let mut other = order.clone();
         other.reverse();
@@ -203,8 +204,7 @@ fn charts_compress_better_than_greedy_walks_and_more_so_when_finer() {
         println!(
             "{resolution} x {resolution} texels: greedy {greedy:.2}, zig-zag {zig_zag:.2}, spiral {spiral:.2} : 1"
         );
-        // Of so few charts both walks come out alike.
-        assert!(spiral > greedy && spiral > 0.97 * zig_zag, "{greedy} {zig_zag} {spiral}");
+        assert!(spiral > greedy && spiral > zig_zag, "{greedy} {zig_zag} {spiral}");
         assert!(spiral > before, "{spiral} after {before}");
         before = spiral;
     }

@@ -41,7 +41,7 @@ use crate::stages::bvh::{Bvh, BvhError};
 use crate::stages::hidden_parts::{self, HiddenPartsError, Seen};
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
 use crate::stages::surface_maps::{
-    self, MapFilter, MapInput, MapOptions, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
+    self, MapFilter, MapInput, MapOptions, MapUntil, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
     texel_objects,
 };
 use crate::stages::texels::{self, Texels};
@@ -76,6 +76,8 @@ crate::settings! {
         sequence: Sequence = Sequence::Spiral, paper "spiral is best";
         /// How far depths keep from the surfaces they tell apart.
         map_bias: f32 = 0.05, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
+        /// How far behind the first surface a depth of a map may be: what lets it hold for longer.
+        map_until: MapUntil = MapUntil::Next, paper "next";
         /// How look-ups are filtered between pixels of a map.
         map_filter: MapFilter = MapFilter::Drawn, paper "not given";
         /// How look-ups are filtered between a sender's texel and those beside it, where points on senders are drawn.
@@ -375,8 +377,12 @@ fn make_maps(
     settings: &Settings,
     apart: Option<&Apart>,
 ) -> Result<PlacedMaps, SurfaceShadowMapsError> {
-    let options =
-        MapOptions { resolution: settings.map_resolution, sequence: settings.sequence, bias: settings.map_bias };
+    let options = MapOptions {
+        resolution: settings.map_resolution,
+        sequence: settings.sequence,
+        bias: settings.map_bias,
+        until: settings.map_until,
+    };
     let sides = side_content(stage);
     let shapes = apart.map_or_else(
         || bytemuck::cast_slice(stage.positions).to_vec(),

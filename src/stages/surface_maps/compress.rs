@@ -23,10 +23,11 @@ impl Interval {
         (self.low..=self.high).contains(&depth)
     }
 
-    /// Behind the first surface by half a pixel's width of a fine map, or in the middle where the second is nearer: what
-    /// stands between both beside the pixel's ray is hidden.
-    fn depth(self) -> u16 {
-        self.low.midpoint(self.high).min(self.low.saturating_add(self.low / 64 + 1))
+    /// In the middle, as far as can be from both surfaces; or behind the first by half a pixel's width of a fine map, where the
+    /// second is that far: what stands between both beside the pixel's ray is hidden then.
+    fn depth(self, is_near: bool) -> u16 {
+        let middle = self.low.midpoint(self.high);
+        if is_near { middle.min(self.low.saturating_add(self.low / 64 + 1)) } else { middle }
     }
 
     fn intersection(self, other: Self) -> Option<Self> {
@@ -54,6 +55,7 @@ const PIXEL_BLOCK: usize = 256;
 pub struct Compressor {
     pixels: Vec<PixelRuns>,
     place_count: usize,
+    is_near: bool,
 }
 
 #[derive(Clone)]
@@ -64,11 +66,11 @@ struct PixelRuns {
 }
 
 impl PixelRuns {
-    fn push(&mut self, place: u16, next: Interval) {
+    fn push(&mut self, place: u16, next: Interval, is_near: bool) {
         match self.open.intersection(next) {
             Some(both) => self.open = both,
             None => {
-                self.runs.push(Run { depth: self.open.depth(), first: self.first });
+                self.runs.push(Run { depth: self.open.depth(is_near), first: self.first });
                 self.open = next;
                 self.first = place;
             }
@@ -88,7 +90,12 @@ pub struct CompressedMaps {
 impl Compressor {
     pub fn new(pixel_count: usize) -> Self {
         let pixel = PixelRuns { runs: Vec::new(), open: Interval::ANY, first: 0 };
-        Self { pixels: vec![pixel; pixel_count], place_count: 0 }
+        Self { pixels: vec![pixel; pixel_count], place_count: 0, is_near: false }
+    }
+
+    /// Depths are taken close behind the first surface, not in the middle.
+    pub fn near(self) -> Self {
+        Self { is_near: true, ..self }
     }
 
     /// Appends whole maps, one after the other; at most [`MAX_PLACES`] in all.
@@ -97,11 +104,15 @@ impl Compressor {
         let first_place = self.place_count;
         debug_assert!(maps.len().is_multiple_of(pixel_count) && first_place + maps.len() / pixel_count <= MAX_PLACES);
         self.place_count += maps.len() / pixel_count.max(1);
+        let is_near = self.is_near;
         // Map after map over a block of pixels: what is read lies in one piece, what is written stays at hand.
         self.pixels.par_chunks_mut(PIXEL_BLOCK).enumerate().for_each(|(block, pixels)| {
             for (k, map) in maps.chunks_exact(pixel_count).enumerate() {
                 let place = (first_place + k) as u16;
-                pixels.iter_mut().zip(&map[block * PIXEL_BLOCK..]).for_each(|(pixel, &next)| pixel.push(place, next));
+                pixels
+                    .iter_mut()
+                    .zip(&map[block * PIXEL_BLOCK..])
+                    .for_each(|(pixel, &next)| pixel.push(place, next, is_near));
             }
         });
     }
@@ -116,7 +127,7 @@ impl Compressor {
         let mut maps = CompressedMaps { offsets: vec![0], runs: Vec::new(), place_count: self.place_count as u32 };
         for mut pixel in self.pixels {
             if self.place_count > 0 {
-                pixel.runs.push(Run { depth: pixel.open.depth(), first: pixel.first });
+                pixel.runs.push(Run { depth: pixel.open.depth(self.is_near), first: pixel.first });
             }
             maps.runs.extend(pixel.runs);
             maps.offsets.push(maps.runs.len() as u32);

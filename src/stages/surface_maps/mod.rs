@@ -1,8 +1,7 @@
 //! Coherent surface shadow maps: from every texel of an atlas, depth in all directions, compressed; whether a texel sees
 //! a point is a look-up.                                                                   [Ritschel2008 3]
 //!
-//! Two rays per pixel find the first surface and the next that may be asked for: which is lit from this side. Any depth in
-//! between answers every query right; taken is one close behind the first, where thin things beside the ray are. The texels
+//! Two rays per pixel find the first surface and the next; any depth in between answers every query right. The texels
 //! are walked so that neighbours see nearly the same ([`sequence`]), and along the walk each pixel keeps one depth for as
 //! long as it holds. The maps are made chunk by chunk, can be interrupted between chunks, and are kept on disk.
 //!
@@ -71,6 +70,16 @@ crate::choice! {
     }
 }
 
+crate::choice! {
+    /// How far behind the first surface a depth may be.
+    pub enum MapUntil {
+        /// The next surface
+        Next = "next",
+        /// The next that is lit from this side, and so can be asked for: fewer runs; thin things beside a pixel's ray leak more
+        Lit = "lit",
+    }
+}
+
 /// How maps are made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapOptions {
@@ -79,6 +88,7 @@ pub struct MapOptions {
     pub sequence: Sequence,
     /// How far depths keep from the surfaces they tell apart, in widths of a pixel.
     pub bias: f32,
+    pub until: MapUntil,
 }
 
 /// The maps on the device.
@@ -157,7 +167,8 @@ impl SurfaceMaps {
         order.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
         let Placement { origins, normals, offset, codes_per_metre } = Placement::new(&input, &order);
 
-        let settings = [options.resolution, options.bias.to_bits(), codes_per_metre.to_bits()];
+        let is_lit = options.until == MapUntil::Lit;
+        let settings = [options.resolution, options.bias.to_bits(), codes_per_metre.to_bits(), u32::from(is_lit)];
         let mut parts: Vec<&[u8]> =
             vec![bytemuck::cast_slice(&settings), bytemuck::cast_slice(&origins), bytemuck::cast_slice(&normals)];
         parts.extend(input.content);
@@ -170,7 +181,7 @@ impl SurfaceMaps {
                 if let (Some(Found::Damaged(reason)), Some(folder)) = (&found, input.cache) {
                     tracing::warn!("{} is damaged ({reason}); made anew", key.file_in(folder).display());
                 }
-                let lit_only = input.apart.is_none();
+                let lit_only = is_lit && input.apart.is_none();
                 let maker =
                     Maker { context, legs: legs(&input, &order), options, codes_per_metre, gap: offset, lit_only };
                 let maps = maker.make(&origins, &normals, watch)?;
@@ -276,7 +287,7 @@ pub fn uncompressed(
     let frame = Placement::new(&input, order);
     let mut all = Vec::new();
     let (legs, codes_per_metre) = (legs(&input, order), frame.codes_per_metre);
-    let lit_only = input.apart.is_none();
+    let lit_only = options.until == MapUntil::Lit && input.apart.is_none();
     let maker = Maker { context, legs, options, codes_per_metre, gap: frame.offset, lit_only };
     maker.intervals(&frame.origins, &frame.normals, watch, |maps, _| {
         all.extend_from_slice(maps);
@@ -355,7 +366,8 @@ struct RayLists {
 impl Maker<'_> {
     fn make(&self, origins: &[Vec3], normals: &[Vec3], watch: &dyn Watch) -> Result<CompressedMaps, SurfaceMapError> {
         let allowed = self.context.limits().storage_buffer_bytes;
-        let mut compressor = Compressor::new(6 * (self.options.resolution as usize).pow(2));
+        let compressor = Compressor::new(6 * (self.options.resolution as usize).pow(2));
+        let mut compressor = if self.lit_only { compressor.near() } else { compressor };
         let mut done = 0;
         self.intervals(origins, normals, watch, |maps, count| {
             compressor.push(maps);
