@@ -12,6 +12,8 @@ uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
 vec3 way = vec3(0.0);
 int bodies = 0;         // left, less those entered
 
+bool is_lit_side(uint triangle, bool is_back) { return true; }
+
 // Counts, and lets the ray go on.
 bool is_hole(uint triangle, vec2 barycentrics)
 {
