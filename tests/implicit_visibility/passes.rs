@@ -8,6 +8,7 @@ use linklight::gpu::shaders::types::{EmitterSample, Receiver, Surfel};
 use linklight::methods::implicit_visibility::{DebugView, Footprint, Frames, Settings, bins};
 use linklight::stages::emitters::EmitterChoice;
 use linklight::stages::false_color;
+use linklight::stages::quadtree::topology::QuadtreeTopology;
 
 const EMPTY_KEY: u64 = u64::MAX;
 
@@ -110,12 +111,14 @@ struct Hidden {
     by_all: bool,
     /// One of them is in its way.
     by_one: bool,
-    /// Weight of those whose planes are in its way where the next bins are, by their nearness to its direction.
+    /// Weight of those whose planes are in its way where the next bins are and their surfaces go on, by their nearness to
+    /// its direction.
     by_most: f32,
 }
 
 /// The bins as a shadow map: twin of `see_emitters`.
-fn hidden_by(row: &[u32], surfels: &[Surfel], at: &Receiver, point: Vec3, n: u32) -> Hidden {
+fn hidden_by(row: &[u32], trees: (&QuadtreeTopology, &[Surfel]), at: &Receiver, point: Vec3, n: u32) -> Hidden {
+    let (topology, surfels) = trees;
     let direction = Quat::from_array(at.frame).inverse() * (point - at.origin);
     let axis = direction.abs().max_position();
     let across = [direction[(axis + 1) % 3], direction[(axis + 2) % 3]].map(|c| c / direction[axis].abs());
@@ -132,15 +135,18 @@ fn hidden_by(row: &[u32], surfels: &[Surfel], at: &Receiver, point: Vec3, n: u32
             hidden.by_all = false;
             continue;
         }
-        let s = &surfels[(winner & !twins::BACK) as usize];
+        let node = winner & !twins::BACK;
+        let s = &surfels[node as usize];
+        let surface = (0..3).fold(node, |node, _| topology.parent(node).unwrap_or(node));
+        let is_within = |s: &Surfel, x: Vec3| s.g1.dot(x - s.centre).powi(2) + s.g2.dot(x - s.centre).powi(2) <= 1.0;
         let side = |x: Vec3| s.normal.dot(x - s.centre);
         let slack = s.thickness + 0.02 * s.extent;
         let is_behind = if side(at.origin) > 0.0 { side(point) < -slack } else { side(point) > slack };
         let met = at.origin.lerp(point, side(at.origin) / (side(at.origin) - side(point)));
-        let there = met - s.centre;
-        let is_beside = there.length() <= s.extent + 2.0 / n as f32 * met.distance(at.origin);
+        let is_near = met.distance(s.centre) <= s.extent + 2.0 / n as f32 * met.distance(at.origin);
+        let is_beside = is_near && is_within(&surfels[surface as usize], met);
         hidden.by_all &= is_behind;
-        hidden.by_one |= is_behind && s.g1.dot(there).powi(2) + s.g2.dot(there).powi(2) <= 1.0;
+        hidden.by_one |= is_behind && is_within(s, met);
         hidden.by_most += if is_behind && is_beside { weight[0] * weight[1] } else { 0.0 };
     }
     hidden
@@ -169,7 +175,8 @@ fn emitters_are_seen_past_the_winners() {
         for (k, sample) in samples.iter().enumerate() {
             let (point, normal) = place(sample);
             let faces = sample.is_double_sided != 0 || normal.dot(at.origin - point) > 0.0;
-            let Hidden { by_all, by_one, by_most } = hidden_by(row, &surfels, at, point, settings.bins);
+            let Hidden { by_all, by_one, by_most } =
+                hidden_by(row, (&method.trees().topology, &surfels), at, point, settings.bins);
             let is_above = (point - at.origin).dot(at.normal) > 0.0;
             let reasons = [by_all, by_one, by_most > 0.5];
             let expected = faces && is_above && reasons == [false; 3];

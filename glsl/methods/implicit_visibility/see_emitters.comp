@@ -6,8 +6,8 @@
 
 // One thread per leaf of a window and word of samples: which points on emitters it sees. The bins are an omnidirectional
 // shadow map: a point is hidden where it lies behind the winners around its direction.             [Dong2007 3]
-// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels[node_count], samples[sample_count],
-// triangles, positions   writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
+// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels, ancestors [node_count],
+// samples[sample_count], triangles, positions   writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
 // Differs from [Dong2007]: every point is tested, so that an emitter smaller than a bin keeps its size and its shadow.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
@@ -18,6 +18,7 @@ layout(set = 0, binding = 4, scalar) readonly buffer Samples { EmitterSample sam
 layout(set = 0, binding = 5, scalar) readonly buffer Triangles { uvec3 triangles[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Visible { uint visible[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Ancestors { uint ancestors[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_leaf;
     uint leaf_count;    // of the window
@@ -28,20 +29,29 @@ layout(push_constant, scalar) uniform Params {
 // How a winner stands to a point that is looked at.
 struct Shade {
     bool by_plane;      // its plane passes between the receiver and the point
-    bool is_beside;     // and where it does is no farther off the winner than the next bins are
+    bool is_beside;     // and where it does is no farther off the winner than the next bins are, and on the same surface
     bool by_itself;     // or is the winner itself
 };
+
+bool is_within(Surfel s, vec3 place)
+{
+    float x = dot(s.g1, place - s.centre), y = dot(s.g2, place - s.centre);
+    return x * x + y * y <= 1.0;
+}
 
 Shade shade_of(uint winner, vec3 origin, vec3 point)
 {
     if (winner == EMPTY_BIN) return Shade(false, false, false);
-    Surfel s = surfels[winner & NODE_MASK];
+    uint node = winner & NODE_MASK;
+    Surfel s = surfels[node];
     float of_origin = dot(s.normal, origin - s.centre), of_point = dot(s.normal, point - s.centre);
     float slack = s.thickness + 0.02 * s.extent;
     if (!(of_origin > 0.0 ? of_point < -slack : of_point > slack)) return Shade(false, false, false);
-    vec3 met = mix(origin, point, of_origin / (of_origin - of_point)), there = met - s.centre;
-    float r = dot(s.g1, there), t = dot(s.g2, there), reach = s.extent + 2.0 / float(params.n) * length(met - origin);
-    return Shade(true, dot(there, there) <= reach * reach, r * r + t * t <= 1.0);
+    vec3 met = mix(origin, point, of_origin / (of_origin - of_point));
+    vec3 there = met - s.centre;
+    float reach = s.extent + 2.0 / float(params.n) * length(met - origin);
+    bool is_beside = dot(there, there) <= reach * reach && is_within(surfels[ancestors[node]], met);
+    return Shade(true, is_beside, is_within(s, met));
 }
 
 // A point is hidden by a winner of one of the four bins around its direction, or by the surface that lies before it in

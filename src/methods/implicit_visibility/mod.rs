@@ -234,6 +234,7 @@ impl ImplicitVisibility {
                 receivers: &self.linking.receivers,
                 leaf_elements: &self.trees.leaf_elements,
                 surfels: &self.trees.surfels,
+                ancestors: &self.trees.ancestors,
                 samples: &self.emitters.samples,
                 triangles: &world.triangles,
                 positions: &world.positions,
