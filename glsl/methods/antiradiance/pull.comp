@@ -24,7 +24,7 @@ void main()
     if (i >= params.count) return;
     uint node = level_nodes[params.first + i];
 
-    // A missing child has no weight.
+    // A missing child is the first one, of no weight.
     uint end = nodes[node].skip, child = node + 1;
     uvec4 children = uvec4(child);
     vec4 weights = vec4(0.0);
@@ -38,9 +38,8 @@ void main()
 
     for (uint bin = part * BINS_A_THREAD; bin < (part + 1) * BINS_A_THREAD; ++bin) {
         uvec4 entries = children + bin * params.node_count;
-        vec3 mean = weights.x * LOAD_ENTRY(exitant, entries.x) + weights.y * LOAD_ENTRY(exitant, entries.y);
-        if (weights.z > 0.0) mean += weights.z * LOAD_ENTRY(exitant, entries.z);
-        if (weights.w > 0.0) mean += weights.w * LOAD_ENTRY(exitant, entries.w);
+        vec3 mean = weights.x * LOAD_ENTRY(exitant, entries.x) + weights.y * LOAD_ENTRY(exitant, entries.y)
+                    + weights.z * LOAD_ENTRY(exitant, entries.z) + weights.w * LOAD_ENTRY(exitant, entries.w);
         STORE_ENTRY(exitant, entry_of(node, bin, params.node_count), mean);
     }
 }
