@@ -12,8 +12,8 @@
 layout(set = 0, binding = 8, scalar) readonly buffer Normals { vec3 normals[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer Leaves { LeafElement leaves[]; };
 layout(set = 0, binding = 10, scalar) readonly buffer TriangleLeaves { uvec2 triangle_leaves[]; };
-layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { HalfVectors direct_irradiance[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { HalfVectors indirect_irradiance[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer DirectIrradiance { SharedVectors direct_irradiance[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer IndirectIrradiance { SharedVectors indirect_irradiance[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer Colors { vec3 colors[]; };
 layout(set = 0, binding = 14, scalar) buffer Direct { vec3 direct[]; };
 layout(set = 0, binding = 15, scalar) buffer Indirect { vec3 indirect[]; };

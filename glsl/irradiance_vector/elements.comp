@@ -17,8 +17,8 @@ layout(set = 0, binding = 4, scalar) readonly buffer IncidentOffsets { uint inci
 layout(set = 0, binding = 5, scalar) readonly buffer IncidentTriangles { uint incident_triangles[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Leaves { LeafElement leaves[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer TriangleLeaves { uvec2 triangle_leaves[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer DirectVectors { HalfVectors direct_vectors[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer IndirectVectors { HalfVectors indirect_vectors[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer DirectVectors { SharedVectors direct_vectors[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer IndirectVectors { SharedVectors indirect_vectors[]; };
 layout(set = 0, binding = 10, scalar) writeonly buffer DirectIrradiance { vec3 direct_irradiance[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer IndirectIrradiance { vec3 indirect_irradiance[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer NeighbourOffsets { uint neighbour_offsets[]; };  // per leaf, and one more

@@ -120,23 +120,39 @@ vec2 plane_coordinates(LeafElement e, vec3 point)
     return 0.5 + 0.5 * vec2(dot(d, e.axis_x), dot(d, e.axis_y)) / max(e.half_extent.xy, vec2(1e-30));
 }
 
-// Irradiance vectors of the three channels in half floats of a unit that fits them.
-struct HalfVectors {
-    uint words[5];
+// Irradiance vectors of the three channels with one exponent, in a unit that they fit: a word a channel, of ten bits an
+// axis and two of the exponent. Off by less than 1/512 of the largest.
+struct SharedVectors {
+    uint words[3];
 };
+const int LEAST_EXPONENT = -48;
 
-HalfVectors packed(mat3 vectors, float inverse_unit)
+SharedVectors packed(mat3 vectors, float inverse_unit)
 {
     mat3 v = inverse_unit * vectors;
-    return HalfVectors(uint[5](packHalf2x16(v[0].xy), packHalf2x16(vec2(v[0].z, v[1].x)), packHalf2x16(v[1].yz),
-                               packHalf2x16(v[2].xy), packHalf2x16(vec2(v[2].z, 0.0))));
+    vec3 most = max(abs(v[0]), max(abs(v[1]), abs(v[2])));
+    // The largest is less than 2^exponent.
+    int exponent = clamp(int(floatBitsToUint(max(most.x, max(most.y, most.z))) >> 23) - 126, LEAST_EXPONENT, LEAST_EXPONENT + 63);
+    float scale = uintBitsToFloat(uint(127 + 9 - exponent) << 23);
+    uint exponent_bits = uint(exponent - LEAST_EXPONENT);
+    SharedVectors s;
+    for (uint c = 0; c < 3; ++c) {
+        uvec3 m = uvec3(clamp(ivec3(round(v[c] * scale)), -512, 511)) & 0x3ffu;
+        s.words[c] = m.x | m.y << 10 | m.z << 20 | (exponent_bits >> 2 * c & 3u) << 30;
+    }
+    return s;
 }
 
-mat3 unpacked(HalfVectors h, float unit)
+mat3 unpacked(SharedVectors s, float unit)
 {
-    vec2 a = unpackHalf2x16(h.words[0]), b = unpackHalf2x16(h.words[1]), c = unpackHalf2x16(h.words[2]);
-    vec2 d = unpackHalf2x16(h.words[3]), e = unpackHalf2x16(h.words[4]);
-    return unit * mat3(a, b, c, d, e.x);
+    int exponent = int(s.words[0] >> 30 | s.words[1] >> 30 << 2 | s.words[2] >> 30 << 4) + LEAST_EXPONENT;
+    float scale = unit * uintBitsToFloat(uint(127 - 9 + exponent) << 23);
+    mat3 v;
+    for (uint c = 0; c < 3; ++c) {
+        int word = int(s.words[c]);
+        v[c] = scale * vec3(bitfieldExtract(word, 0, 10), bitfieldExtract(word, 10, 10), bitfieldExtract(word, 20, 10));
+    }
+    return v;
 }
 
 // A point of the element's horizontal plane; (0, 0) and (1, 1) are corners of its box.

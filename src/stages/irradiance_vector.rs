@@ -3,7 +3,7 @@
 use super::elements::Elements;
 use super::world::World;
 use crate::gpu::shaders::irradiance_vector as passes;
-use crate::gpu::shaders::types::{HalfVectors, LeafElement};
+use crate::gpu::shaders::types::{LeafElement, SharedVectors};
 use crate::gpu::{Buffer, Recorder};
 use glam::{UVec2, Vec3};
 
@@ -14,9 +14,9 @@ pub struct ElementLight<'a> {
     /// Per triangle: the leaves of its front and back, u32::MAX where there is none.
     pub triangle_leaves: &'a Buffer<UVec2>,
     /// From emitters and the environment, per leaf and function, in units.
-    pub direct: &'a Buffer<HalfVectors>,
+    pub direct: &'a Buffer<SharedVectors>,
     /// Reflected at least once.
-    pub indirect: &'a Buffer<HalfVectors>,
+    pub indirect: &'a Buffer<SharedVectors>,
     /// W/m2.
     pub unit: f32,
     /// Functions a leaf.

@@ -2,7 +2,7 @@
 
 use crate::common::TestContext;
 use glam::{Mat3, Vec3};
-use linklight::gpu::shaders::types::{FaceElement, HalfVectors};
+use linklight::gpu::shaders::types::{FaceElement, SharedVectors};
 use linklight::methods::face_cluster::{FaceClusterError, FaceClusters, Settings, Stage};
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
@@ -130,15 +130,10 @@ pub fn received(leaves: &[Leaf], wanted: impl Fn(&FaceElement) -> bool) -> (f64,
     })
 }
 
-/// Nine numbers out of a record of half floats.
-pub fn of_halves(halves: &HalfVectors, unit: f32) -> [f32; 9] {
-    let half = |bits: u32| {
-        let (sign, exponent, mantissa) = (bits >> 15 & 1, (bits >> 10 & 31) as i32, (bits & 1023) as f32);
-        let size = match exponent {
-            0 => mantissa * 2f32.powi(-24),
-            _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
-        };
-        unit * if sign == 1 { -size } else { size }
-    };
-    std::array::from_fn(|k| half(halves.words[k / 2] >> (16 * (k % 2) as u32) & 0xffff))
+/// Nine numbers out of a record with a shared exponent.
+pub fn of_shared(record: &SharedVectors, unit: f32) -> [f32; 9] {
+    let exponent: u32 = (0..3).map(|c| (record.words[c] >> 30) << (2 * c)).sum();
+    let mantissa = |bits: u32| if bits < 512 { bits as f32 } else { bits as f32 - 1024.0 };
+    let value = |k: usize| mantissa(record.words[k / 3] >> (10 * (k % 3)) & 0x3ff);
+    std::array::from_fn(|k| unit * value(k) / 512.0 * 2f32.powi(exponent as i32 - 48))
 }

@@ -5,31 +5,29 @@ use crate::compare::{Tolerance, hold, tells_apart};
 use glam::{Mat3, UVec2, UVec3, Vec3};
 use linklight::gpu::Context;
 use linklight::gpu::shaders::irradiance_vector::{Elements, ElementsConstants, ElementsParams};
-use linklight::gpu::shaders::types::{HalfVectors, LeafElement};
+use linklight::gpu::shaders::types::{LeafElement, SharedVectors};
 
 const BACK: u32 = 1 << 31;
 const NO_LEAF: u32 = u32::MAX;
 pub const FUNCTIONS: usize = 3;
 pub const UNIT: f32 = 0.25;
 pub const REACH: f32 = 0.8;
-/// Some tens of products; vectors are halves exactly.
+/// Some tens of products; vectors are kept exactly.
 const TOLERANCE: Tolerance = Tolerance { absolute: 1e-5, relative: 1e-5 };
 
-/// Bits of a half float of a multiple of 1/8 below 16.
-fn half(value: f32) -> u32 {
-    if value == 0.0 {
-        return 0;
-    }
-    let bits = value.to_bits();
-    let exponent = (bits >> 23 & 0xff) as i32 - 127 + 15;
-    assert!((1..31).contains(&exponent) && bits & 0x1fff == 0, "{value} is no half");
-    (bits >> 31 << 15) | (exponent as u32) << 10 | (bits >> 13 & 0x3ff)
-}
-
-pub fn packed(m: &Mat3) -> HalfVectors {
-    let values = m.to_cols_array();
-    let word = |k: usize| half(values[2 * k]) | values.get(2 * k + 1).map_or(0, |value| half(*value)) << 16;
-    HalfVectors { words: [word(0), word(1), word(2), word(3), word(4)] }
+/// With the exponent of 16, of which all multiples of 1/32 are exact.
+pub fn packed(m: &Mat3) -> SharedVectors {
+    let exponent = 4 + 48u32;
+    let mantissa = |value: f32| {
+        assert!(value.abs() < 16.0 && (32.0 * value).fract() == 0.0, "{value} is not exact");
+        (32.0 * value) as i32 as u32 & 0x3ff
+    };
+    let columns = m.to_cols_array_2d();
+    let word = |c: usize| {
+        let [x, y, z] = columns[c].map(mantissa);
+        x | y << 10 | z << 20 | (exponent >> (2 * c) & 3) << 30
+    };
+    SharedVectors { words: [word(0), word(1), word(2)] }
 }
 
 /// Leaves, and those beside each: what light is on them, in units of [`UNIT`] and [`FUNCTIONS`] a leaf.
@@ -134,7 +132,7 @@ impl Case {
     }
 
     fn on_device(&self, context: &Context) -> [Vec<Vec3>; 2] {
-        let halves = |vectors: &[Mat3]| -> Vec<HalfVectors> { vectors.iter().map(packed).collect() };
+        let halves = |vectors: &[Mat3]| -> Vec<SharedVectors> { vectors.iter().map(packed).collect() };
         let out = [(); 2].map(|()| context.buffer("test/irradiance", self.entries.len()).unwrap());
         let pass = Elements {
             element_vertices: &context.upload("test/entries", &self.entries).unwrap(),
@@ -175,5 +173,6 @@ fn irradiance_of_elements_agrees_with_its_twin() {
         let alone = Case { leaves: Leaves { rows: vec![Vec::new(); 4], ..case.leaves }, ..case };
         tells_apart("without neighbours", &alone.twin(&alone.direct), &expected, TOLERANCE);
     }
-    assert_eq!([1.0, -0.125, 8.0, 0.0].map(half), [0x3c00, 0xb000, 0x4800, 0]);
+    let words = packed(&Mat3::from_diagonal(Vec3::new(1.0, -0.125, 8.0))).words;
+    assert_eq!(words, [32, 0x3fc << 10 | 1 << 30, 256 << 20 | 3 << 30]);
 }

@@ -6,19 +6,19 @@
 // solution.                                                                                    [Gobbetti2003 4]
 // reads elements, leaf_indices, direct and indirect irradiance (per element and function, W/m2)   writes leaves and
 // their irradiance (per leaf and function)   shared none
-// Differs from [Gobbetti2003]: half floats; light from emitters apart from what was reflected.
+// Differs from [Gobbetti2003]: a shared exponent; light from emitters apart from what was reflected.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer LeafIndices { uint leaf_indices[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer Direct { mat3 direct_irradiance[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer Indirect { mat3 indirect_irradiance[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Leaves { LeafElement leaves[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer LeafDirect { HalfVectors leaf_direct[]; };
-layout(set = 0, binding = 6, scalar) writeonly buffer LeafIndirect { HalfVectors leaf_indirect[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer LeafDirect { SharedVectors leaf_direct[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer LeafIndirect { SharedVectors leaf_indirect[]; };
 layout(push_constant, scalar) uniform Params {
     uint element_count;
     uint functions;
-    float inverse_unit;     // of the half floats, per W/m2
+    float inverse_unit;     // of what is kept, per W/m2
 } params;
 
 void main()

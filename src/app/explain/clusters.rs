@@ -8,9 +8,8 @@ use crate::app::AppError;
 use crate::app::on_clusters::{ClustersShown, cluster_stage};
 use crate::display::direct::Canvas;
 use crate::display::irradiance_vector;
-use crate::gpu::shaders::types::{HalfVectors, LeafElement};
+use crate::gpu::shaders::types::{LeafElement, SharedVectors};
 use crate::gpu::{Buffer, Context};
-use crate::methods::antiradiance::half;
 use crate::report::explanation::Light;
 use crate::stages::film::Film;
 use crate::stages::irradiance_vector::ElementLight;
@@ -127,11 +126,11 @@ fn weight_of(element: &LeafElement, place: Vec3, reach: f32) -> f32 {
     share / (4.0 * extent.x * extent.y).max(1e-30)
 }
 
-/// The irradiance vectors of the three channels at a place of a leaf, W/m2.
+/// The irradiance vectors of the three channels at a place of a leaf, W/m2: `unpacked` of `lib/face_element.glsl`.
 fn at_place(
     context: &Context,
     light: &ElementLight<'_>,
-    buffer: &Buffer<HalfVectors>,
+    buffer: &Buffer<SharedVectors>,
     leaf: u32,
     uv: Vec2,
 ) -> Result<[Vec3; 3], AppError> {
@@ -139,9 +138,11 @@ fn at_place(
     let packed = context.download_range(buffer, first..first + count)?;
     let mut sum = [Vec3::ZERO; 3];
     for (k, vectors) in packed.iter().enumerate() {
-        let value = |i: usize| half((vectors.words[i / 2] >> (16 * (i % 2))) as u16) * light.unit * basis(k, uv);
-        for (channel, sum) in sum.iter_mut().enumerate() {
-            *sum += Vec3::new(value(3 * channel), value(3 * channel + 1), value(3 * channel + 2));
+        let [r, g, b] = vectors.words.map(|word| word >> 30);
+        let scale = 2f32.powi((r | g << 2 | b << 4) as i32 - 48 - 9) * light.unit * basis(k, uv);
+        for (word, sum) in vectors.words.iter().zip(&mut sum) {
+            let mantissa = |axis: u32| ((word << (22 - 10 * axis)) as i32 >> 22) as f32;
+            *sum += scale * Vec3::new(mantissa(0), mantissa(1), mantissa(2));
         }
     }
     Ok(sum)

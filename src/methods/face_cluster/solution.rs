@@ -1,27 +1,27 @@
 //! What is kept of a solve: the light of its leaves. All else that shooting needs is given back.
 //!
-//! Differs from [Gobbetti2003]: irradiance in half floats of a common unit, and inner elements go altogether, since
+//! Differs from [Gobbetti2003]: irradiance with a shared exponent, in a common unit, and inner elements go altogether, since
 //! nothing is shot from a solution that is shown.
 //!
 //! [Gobbetti2003]: crate::methods::PAPERS
 
 use super::{FaceClusterError, FaceClusters, Stage};
 use crate::gpu::shaders::methods::face_cluster as passes;
-use crate::gpu::shaders::types::{HalfVectors, LeafElement};
+use crate::gpu::shaders::types::{LeafElement, SharedVectors};
 use crate::gpu::{Buffer, Context, Recorder};
 use crate::stages::scan;
 use glam::Vec3;
 
-/// The largest half float that all light together may come to: four times less than there are.
+/// What all light together may come to in units: the most that a shared exponent holds is twice that.
 const MOST_UNITS: f32 = 16384.0;
 
 /// Light on leaves; their number is that of [`super::State::triangle_leaves`].
 pub struct Solution {
     pub leaves: Buffer<LeafElement>,
     /// Per leaf and function, in units: from emitters and the environment.
-    pub direct: Buffer<HalfVectors>,
+    pub direct: Buffer<SharedVectors>,
     /// Reflected at least once.
-    pub indirect: Buffer<HalfVectors>,
+    pub indirect: Buffer<SharedVectors>,
     /// W/m2.
     pub unit: f32,
     /// Per leaf, and one more: where the row of leaves whose light reaches it starts.
