@@ -31,7 +31,7 @@ fn mean(picture: &Picture) -> DVec3 {
 fn the_furnace_of_every_method_is_even() {
     let folder = tempfile::tempdir().unwrap();
     for method in METHODS {
-        let picture = gathered(folder.path(), "builtin:furnace", method, "--bounces 2 --size 24x18 --spp 2");
+        let picture = gathered(folder.path(), "builtin:furnace", method, "--bounces 2 --size 16x12 --spp 2");
         let even = mean(&picture).x;
         let bumps = picture.rgb.iter().map(|rgb| (f64::from(rgb.x) / even - 1.0).powi(2)).sum::<f64>();
         let bumps = (bumps / picture.rgb.len() as f64).sqrt();

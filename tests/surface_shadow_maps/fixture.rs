@@ -60,10 +60,20 @@ impl Fixture {
         Self::posed(context, scene, environment, pose)
     }
 
+    /// With specular lobes, which the others leave out.
+    pub fn shiny(context: &TestContext, scene: Scene, environment: &Environment) -> Self {
+        let pose = Pose::rest(&scene);
+        Self::of(context, scene, environment, pose, false)
+    }
+
     pub fn posed(context: &TestContext, scene: Scene, environment: &Environment, pose: Pose) -> Self {
+        Self::of(context, scene, environment, pose, true)
+    }
+
+    fn of(context: &TestContext, scene: Scene, environment: &Environment, pose: Pose, diffuse: bool) -> Self {
         let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
         let rest_positions = deform::world_positions(&geometry, &Pose::rest(&scene));
-        let world = World::new(context, &scene, &geometry, &pose, environment, true).unwrap();
+        let world = World::new(context, &scene, &geometry, &pose, environment, diffuse).unwrap();
         let vertices = deform::world_vertices(&geometry, &pose);
         let bounds = vertices.bounds().unwrap();
         let positions = context.download(&world.positions).unwrap();

@@ -4,6 +4,7 @@ mod checked;
 #[path = "../common/mod.rs"]
 mod common;
 mod fixture;
+mod glossy;
 mod hidden;
 mod kernels;
 mod maps;
