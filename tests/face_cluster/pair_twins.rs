@@ -170,7 +170,7 @@ fn past_cluster(
 }
 
 /// Thresholds of light behind blocked rays that is looked for in the halves.
-const WORTH_LOOKING_ON: f64 = 2.0;
+const WORTH_LOOKING_ON: f64 = 5.0;
 
 /// Settings of a pass of light.
 #[derive(Clone, Copy)]
