@@ -1,9 +1,9 @@
-//! What is kept of a solution against twins: which leaves there are, who finds them, and their light.
+//! What is kept of a solution against twins: which leaves there are, who finds them, and their light; and what is left.
 
 use crate::common::Random;
-use crate::grown::{FUNCTIONS, as_words, check, flat, grown, random_vectors, vectors};
+use crate::grown::{FUNCTIONS, RADIOSITY_FUNCTIONS, as_words, check, flat, grown, random_vectors, vectors};
 use crate::twins::NONE;
-use glam::{DVec3, UVec2};
+use glam::{DVec3, UVec2, Vec3};
 use linklight::gpu::Buffer;
 use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::{FaceElement, LeafElement};
@@ -143,4 +143,29 @@ fn leaves_know_whose_light_reaches_them() {
         }
     }
     assert!(pairs > leaves.len(), "{pairs} neighbours of {} leaves", leaves.len());
+}
+
+/// Shooting goes on while any colour is left to shoot.
+#[test]
+fn the_largest_unshot_light_is_of_any_colour() {
+    let g = grown(60);
+    let count = g.elements.len();
+    let (leaf, element) = g.elements.iter().enumerate().find(|(_, element)| element.children == NONE).unwrap();
+    for color in 0..3 {
+        let mut unshot = vec![Vec3::ZERO; count * RADIOSITY_FUNCTIONS];
+        unshot[leaf * RADIOSITY_FUNCTIONS][color] = 2.0;
+        let (elements, next, pool) = (g.table(&g.elements), g.table(&unshot), g.pool(count, count));
+        let mut recorder = g.context.recorder("test").unwrap();
+        let pass = passes::Pull {
+            elements: &elements,
+            next_unshot: &next,
+            pool: &pool,
+            params: passes::PullParams { element_count: count as u32, level: element.level },
+            constants: passes::PullConstants { radiosity_functions: RADIOSITY_FUNCTIONS as u32 },
+        };
+        recorder.dispatch(&pass, count);
+        recorder.submit().unwrap();
+        let found = f32::from_bits(g.read(&pool)[0].largest_unshot);
+        assert!((found - 2.0).abs() < 1e-6, "colour {color}: {found}");
+    }
 }
