@@ -141,7 +141,7 @@ fn growth(_: &mut Criterion) {
         let count = f64::from(report.elements);
         let memory = context.memory_by_owner();
         let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-        let peak = mebibytes(memory.iter().map(|(_, use_of)| use_of.peak_bytes).sum());
+        let peak = mebibytes(memory.values().map(|use_of| use_of.peak_bytes).sum());
         println!(
             "{count} elements, N = 8: {:.0} ms, {:.1} M pairs, {:.1} M links; at most {:.0} MiB, of these winners {:.0} ({:.2} \
              bytes per element and bin), keys {:.0}",

@@ -197,10 +197,11 @@ fn texels_of_a_method_are_baked_as_they_are() {
 }
 
 /// Clusters have no vertices of their own: in a furnace those of the mesh take the irradiance B of one bounce, 3/2 pi.
+/// In the corners the solution itself is too bright, in step with its threshold: 6 % at 1e-5, 3 % at 1e-6.
 #[test]
 fn clusters_of_faces_are_baked_at_vertices() {
     let folder = tempfile::tempdir().unwrap();
-    let options = ["--", "--bounces", "1", "--diffuse", "--elements", "300"];
+    let options = ["--", "--bounces", "1", "--diffuse", "--elements", "300", "--set", "threshold=1e-6"];
     let (glb, _) = bake(folder.path(), "builtin:furnace", &["--method", "face-cluster"], &options);
     let (document, buffers, _) = read_by_another(&glb);
     for primitive in document.meshes().next().unwrap().primitives() {
@@ -209,7 +210,7 @@ fn clusters_of_faces_are_baked_at_vertices() {
         let bytes = &buffers[0].0[view.offset() + accessor.offset()..][..12 * accessor.count()];
         for bytes in bytes.chunks(4) {
             let value = f32::from_le_bytes(bytes.try_into().unwrap());
-            assert!((value / (1.5 * std::f32::consts::PI) - 1.0).abs() < 0.05, "{value}");
+            assert!((value / (1.5 * std::f32::consts::PI) - 1.0).abs() < 0.04, "{value}");
         }
     }
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use common::TestContext;
-use common::scenes::{lambert, light, parallelogram, scene};
+use common::scenes::{lambert, light, nearest_texture, parallelogram, scene};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
@@ -15,7 +15,7 @@ use linklight::scene::deform::world_vertices;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
-use linklight::scene::{Image, LightKind, Material, Node, Scene, Texture, TextureRef, Wrap};
+use linklight::scene::{Image, LightKind, Material, Node, Scene, TextureRef};
 use linklight::stages::film::Film;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
@@ -186,14 +186,7 @@ fn a_mask_shades_where_it_is_not_cut_out() {
         square.uv[1] = square.uv[0].iter().map(|uv| Vec2::new(1.0 - uv.x, uv.y)).collect();
         let rgba = vec![255, 255, 255, 255, 255, 255, 255, 128];
         base.images = vec![Image { name: "half".into(), width: 2, height: 1, rgba, srgb: false }];
-        base.textures = vec![Texture {
-            image: 0,
-            wrap: [Wrap::ClampToEdge; 2],
-            mag_linear: false,
-            min_linear: false,
-            mipmapped: false,
-            mip_linear: false,
-        }];
+        base.textures = vec![nearest_texture(0)];
         let base_color_texture =
             Some(TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] });
         let mut mask = Material { base_color_texture, alpha_cutoff: Some(0.5), ..lambert(Vec3::splat(0.2)) };

@@ -1,6 +1,6 @@
 //! Holes of alpha masks: rays pass them in both tracers, and nothing else changes.
 
-use crate::common::scenes::{lambert, parallelogram, scene};
+use crate::common::scenes::{lambert, nearest_texture, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::trace::cast_by;
 use glam::{Vec2, Vec3, Vec4};
@@ -8,7 +8,7 @@ use linklight::gpu::shaders::types::Ray;
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
-use linklight::scene::{Image, Material, Texture, TextureRef, Wrap};
+use linklight::scene::{Image, Material, TextureRef};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
@@ -32,14 +32,7 @@ fn rays_pass_holes_of_masks() {
         rgba: (0..CELLS * CELLS).flat_map(texel).collect(),
         srgb: true,
     };
-    let nearest = Texture {
-        image: 0,
-        wrap: [Wrap::ClampToEdge; 2],
-        mag_linear: false,
-        min_linear: false,
-        mipmapped: false,
-        mip_linear: false,
-    };
+    let nearest = nearest_texture(0);
     let slot = TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
     let masked = Material {
         base_color: Vec4::ONE,

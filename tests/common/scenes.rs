@@ -1,7 +1,7 @@
 //! Small scenes made by hand, for closed forms.
 
 use glam::{Vec2, Vec3, Vec4};
-use linklight::scene::{Light, LightKind, Material, Mesh, Node, Primitive, Scene, Transform};
+use linklight::scene::{Light, LightKind, Material, Mesh, Node, Primitive, Scene, Texture, Transform, Wrap};
 
 /// A Lambertian two-sided material.
 pub fn lambert(albedo: Vec3) -> Material {
@@ -73,4 +73,16 @@ pub fn scene(materials: Vec<Material>, primitives: Vec<Primitive>, lights: &[(Li
 /// A punctual light of white light.
 pub fn light(kind: LightKind, intensity: f32) -> Light {
     Light { name: "light".into(), kind, intensity: Vec3::splat(intensity), range: None }
+}
+
+/// Texels as they are, clamped at the edges.
+pub fn nearest_texture(image: u32) -> Texture {
+    Texture {
+        image,
+        wrap: [Wrap::ClampToEdge; 2],
+        mag_linear: false,
+        min_linear: false,
+        mipmapped: false,
+        mip_linear: false,
+    }
 }

@@ -1,6 +1,6 @@
 //! Closed forms and conservation laws.
 
-use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::common::scenes::{lambert, light, nearest_texture, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, Leaf, builtin_scene, leaves, received};
 use crate::twins;
@@ -8,7 +8,7 @@ use glam::Vec3;
 use linklight::methods::face_cluster::rules::{Basis, Rule};
 use linklight::methods::face_cluster::{FaceClusterError, FaceClusters, Settings, Stage, Visibility};
 use linklight::scene::environment::Environment;
-use linklight::scene::{Image, LightKind, Material, Texture, TextureRef, Wrap};
+use linklight::scene::{Image, LightKind, Material, TextureRef};
 use linklight::stages::work::{Interrupted, Watch};
 use std::f32::consts::PI;
 
@@ -425,14 +425,7 @@ fn light_through_a_slit_is_found() {
         rgba: (0..10).flat_map(|k| [255, 255, 255, if k == 3 { 0 } else { 255 }]).collect(),
         srgb: true,
     });
-    masked.textures.push(Texture {
-        image: 0,
-        wrap: [Wrap::ClampToEdge; 2],
-        mag_linear: false,
-        min_linear: false,
-        mipmapped: false,
-        mip_linear: false,
-    });
+    masked.textures.push(nearest_texture(0));
     // By brute force: places of the floor against places of the lamp, through the slit's height.
     let (cells, mut expected) = (96, 0.0f64);
     let at = |k: i32| (f64::from(k) + 0.5) / f64::from(cells);

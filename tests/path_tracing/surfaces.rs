@@ -1,5 +1,6 @@
 //! What surfaces do to light beside reflecting it: sides, holes, unlit materials, textures, normal maps.
 
+use crate::common::scenes::nearest_texture;
 use crate::made;
 use crate::render::{Set, looking_down, mean, options};
 use glam::{Quat, Vec2, Vec3, Vec4};
@@ -89,14 +90,7 @@ fn light_and_sight_pass_through_holes() {
 fn half_white(scene: &mut Scene) -> TextureRef {
     let rgba = vec![0, 0, 0, 255, 255, 255, 255, 255];
     scene.images.push(Image { name: "halves".into(), width: 2, height: 1, rgba, srgb: true });
-    scene.textures.push(Texture {
-        image: scene.images.len() as u32 - 1,
-        wrap: [Wrap::ClampToEdge; 2],
-        mag_linear: false,
-        min_linear: false,
-        mipmapped: false,
-        mip_linear: false,
-    });
+    scene.textures.push(nearest_texture(scene.images.len() as u32 - 1));
     let texture = scene.textures.len() as u32 - 1;
     TextureRef { texture, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] }
 }
