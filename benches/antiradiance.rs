@@ -81,7 +81,8 @@ fn paper_settings(refinement: f32) -> Settings {
 /// Milliseconds on the device of all passes of that name.
 fn device_ms(records: &[PassRecord], names: &[&str]) -> f64 {
     let own = records.iter().filter(|record| names.iter().any(|name| record.name.ends_with(name)));
-    own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
+    // From zero: the sum of nothing is -0.
+    own.fold(0.0, |sum, record| sum + (record.end_ns - record.start_ns) as f64 * 1e-6)
 }
 
 const LOCAL_PASSES: [&str; 4] = ["/local_irradiance", "/local_reflect", "/local_exitant", "/local_residual"];

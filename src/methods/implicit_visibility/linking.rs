@@ -14,7 +14,7 @@ use glam::Vec3;
 use std::ops::Range;
 
 /// Groups of receivers whose links are made together, and submitted at once: between them the user may interrupt.
-const GROUPS_AT_ONCE: u32 = 1 << 11;
+const GROUPS_AT_ONCE: u64 = 1 << 11;
 /// Threads of a group's workgroup.
 const LINKERS: u32 = 64;
 /// Senders of each kind that a group holds before they are linked.
@@ -100,8 +100,11 @@ impl Sizes {
         let node_bytes = 16 * (SENDER_TEXELS + RECEIVER_TEXELS) as u64 * u64::from(trees.node_count());
         let receiver_bytes = leaves * size_of::<Receiver>() as u64 + node_bytes;
         let most_groups = windows.iter().map(|window| window.groups.iter().map(Vec::len).sum::<usize>()).max();
-        let groups = most_groups.unwrap_or(0).min(GROUPS_AT_ONCE as usize);
-        let held_bytes = groups as u64 * (u64::from(4 * KINDS * CAPACITY) + size_of::<GroupWalk>() as u64);
+        // All that they hold is one binding.
+        let group_bytes = u64::from(4 * KINDS * CAPACITY);
+        let at_once = (context.limits().storage_buffer_bytes / group_bytes).clamp(1, GROUPS_AT_ONCE);
+        let groups = most_groups.unwrap_or(0).min(at_once as usize);
+        let held_bytes = groups as u64 * (group_bytes + size_of::<GroupWalk>() as u64);
         let bytes = 8 * keys as u64 + 4 * (bins + bins.div_ceil(32)) * leaves + receiver_bytes + held_bytes;
         Self { windows, keys, groups, bytes }
     }
@@ -167,7 +170,7 @@ impl Linking {
             recorder.fill(&self.counts, 0);
             recorder.submit()?;
             let mut first_group = 0;
-            for groups in window.plan.groups.concat().chunks(GROUPS_AT_ONCE as usize) {
+            for groups in window.plan.groups.concat().chunks(self.group_walks.len().max(1)) {
                 let group_count = groups.len() as u32;
                 let mut is_start = true;
                 // Walks with more senders than a group holds take several rounds.
