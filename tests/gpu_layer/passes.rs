@@ -5,9 +5,10 @@ use crate::common::{Random, TestContext};
 use glam::Vec3;
 use linklight::gpu::shaders::display::{ShadowMap, ShadowMapParams};
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
+use linklight::gpu::shaders::types::ShadowView;
 use linklight::gpu::shaders::yardstick::{MultiplyAdd, MultiplyAddParams};
 use linklight::gpu::{
-    Context, Format, Image, ImageDescription, Load, OptionalFeatures, Options, RasterState, Shape, Target,
+    Buffer, Context, Format, Image, ImageDescription, Load, OptionalFeatures, Options, RasterState, Shape, Target,
 };
 use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
@@ -43,6 +44,19 @@ fn empty_world(context: &Context) -> World {
     World::new(context, &scene, &geometry, &Pose::rest(&scene), &Environment::default(), false).unwrap()
 }
 
+fn shadow_map<'a>(world: &'a World, shadow_views: &'a Buffer<ShadowView>) -> ShadowMap<'a> {
+    ShadowMap {
+        triangles: &world.triangles,
+        positions: &world.positions,
+        attributes: &world.attributes,
+        shadow_views,
+        triangle_materials: &world.triangle_materials,
+        materials: &world.materials,
+        textures: &world.textures,
+        params: ShadowMapParams { view: 0 },
+    }
+}
+
 fn depth_image(context: &Context) -> Image {
     let description = ImageDescription {
         name: "test/depth",
@@ -62,16 +76,7 @@ fn a_pass_behind_a_draw_is_timed_whole() {
     let context = TestContext::new();
     let world = empty_world(&context);
     let (shadow_views, depth) = (context.buffer("test/views", 1).unwrap(), depth_image(&context));
-    let draw = ShadowMap {
-        triangles: &world.triangles,
-        positions: &world.positions,
-        attributes: &world.attributes,
-        shadow_views: &shadow_views,
-        triangle_materials: &world.triangle_materials,
-        materials: &world.materials,
-        textures: &world.textures,
-        params: ShadowMapParams { view: 0 },
-    };
+    let draw = shadow_map(&world, &shadow_views);
     let values = context.upload("test/values", &[0.5f32; 1 << 16]).unwrap();
     let work = MultiplyAdd { values: &values, params: MultiplyAddParams { count: 1 << 16, iterations: 100 } };
     let state = RasterState { depth_test: true, ..RasterState::default() };
@@ -102,16 +107,7 @@ fn a_draw_of_nothing_still_clears() {
     let world = empty_world(&context);
     let shadow_views = context.buffer("test/views", 1).unwrap();
     let depth = depth_image(&context);
-    let pass = ShadowMap {
-        triangles: &world.triangles,
-        positions: &world.positions,
-        attributes: &world.attributes,
-        shadow_views: &shadow_views,
-        triangle_materials: &world.triangle_materials,
-        materials: &world.materials,
-        textures: &world.textures,
-        params: ShadowMapParams { view: 0 },
-    };
+    let pass = shadow_map(&world, &shadow_views);
     let state = RasterState { depth_test: true, ..RasterState::default() };
     let target = |layer, load| Target { color: vec![], depth: Some((&depth, layer, load)) };
     let mut recorder = context.recorder("test").unwrap();
