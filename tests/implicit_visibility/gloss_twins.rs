@@ -17,7 +17,7 @@ use std::f64::consts::PI;
 pub const TOLERANCE: Tolerance = Tolerance { absolute: 2e-5, relative: 5e-4 };
 
 /// Of the leaves' cube maps, and of the tables.
-pub const N: u32 = 5;
+pub const N: u32 = 6;
 pub const SIDE: u32 = 2;
 
 pub fn unit_vector(random: &mut Random) -> Vec3 {
@@ -38,7 +38,6 @@ struct Case {
     receivers: Vec<Receiver>,
     /// Of the window, bin after bin.
     winners: Vec<u32>,
-    surfels: Vec<Surfel>,
     node_radiosity: Vec<Vec3>,
     glossy_of_node: Vec<u32>,
     glossy_leaves: Vec<u32>,
@@ -75,13 +74,11 @@ impl Case {
         let glossy: Vec<u32> = glossy_leaves.iter().copied().chain(all..nodes).collect();
         let mut glossy_of_node = vec![u32::MAX; nodes as usize];
         glossy.iter().zip(0..).for_each(|(&node, index)| glossy_of_node[node as usize] = index);
-        let surfels = (0..nodes).map(|_| Surfel { centre: 2.0 * unit_vector(random), ..Surfel::zeroed() });
-        let surfels: Vec<Surfel> = surfels.collect();
         let lobe =
             |random: &mut Random| LeafGloss { f0: 0.9 * color(random), f90: 1.0, alpha: 0.05 + 0.6 * random.unit() };
         Self {
             first_leaf,
-            node_radiosity: surfels.iter().map(|_| color(random)).collect(),
+            node_radiosity: (0..nodes).map(|_| color(random)).collect(),
             specular: (0..glossy.len() as u32 * 6 * SIDE * SIDE).map(|_| color(random)).collect(),
             bin_radiance: (0..bins).map(|_| color(random)).collect(),
             // Elements in another order than leaves, backs among them.
@@ -92,7 +89,6 @@ impl Case {
             lobes: (0..all.div_ceil(2)).map(|_| lobe(random)).collect(),
             receivers,
             winners,
-            surfels,
             glossy_of_node,
             glossy_leaves,
         }
@@ -129,7 +125,6 @@ impl Case {
             receivers: &context.upload("test/receivers", &self.receivers).unwrap(),
             bin_vectors: &context.upload("test/vectors", &bins::vectors(N)).unwrap(),
             bin_radiance: &context.upload("test/sky", &self.bin_radiance).unwrap(),
-            surfels: &context.upload("test/surfels", &self.surfels).unwrap(),
             node_radiosity: &context.upload("test/radiosity", &self.node_radiosity).unwrap(),
             glossy_of_node: &context.upload("test/glossy of node", &self.glossy_of_node).unwrap(),
             specular: &context.upload("test/specular", &self.specular).unwrap(),
@@ -176,7 +171,7 @@ impl Case {
                     let from = (frame * *vector).normalize();
                     let weight = f64::from(cosine) * brdf(f0, lobe.f90.into(), alpha, normal, to_eye, from.as_dvec3());
                     let winner = self.winners[bin * self.leaf_count() as usize + (leaf - self.first_leaf) as usize];
-                    sum += weight * self.arriving(winner, from, at, table_side, sky).as_dvec3();
+                    sum += weight * self.arriving(winner, from, table_side, sky).as_dvec3();
                     weights += weight;
                 }
                 let share = specular_albedo(f0, lobe.f90.into(), alpha, normal.dot(to_eye));
@@ -187,7 +182,7 @@ impl Case {
         out
     }
 
-    fn arriving(&self, winner: u32, from: Vec3, at: &Receiver, table_side: u32, sky: bool) -> Vec3 {
+    fn arriving(&self, winner: u32, from: Vec3, table_side: u32, sky: bool) -> Vec3 {
         if winner == twins::EMPTY {
             return if sky { self.bin_radiance[bins::bin_of(from, N) as usize] } else { Vec3::ZERO };
         }
@@ -199,7 +194,7 @@ impl Case {
         if table_side == 0 || glossy == u32::MAX {
             return even;
         }
-        let bin = bins::bin_of(at.origin - self.surfels[winner as usize].centre, table_side);
+        let bin = bins::bin_of(-from, table_side);
         even + self.specular[(glossy * 6 * table_side * table_side + bin) as usize]
     }
 }
@@ -244,7 +239,6 @@ fn what_comes_through_the_bins_is_reflected_by_the_lobe() {
             to.clone_from(from);
         }
         wrong.receivers.clone_from(&case.receivers);
-        wrong.surfels.clone_from(&case.surfels);
         wrong.node_radiosity.clone_from(&case.node_radiosity);
         wrong.bin_radiance.clone_from(&case.bin_radiance);
         wrong.lobes.clone_from(&case.lobes);

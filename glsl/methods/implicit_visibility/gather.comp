@@ -62,7 +62,7 @@ void main()
             }
             if (TABLE_SIDE != 0 && glossy_of_node[winner] != EMPTY_BIN)
                 sent += PI * specular[glossy_of_node[winner] * 6 * TABLE_SIDE * TABLE_SIDE
-                                      + bin_of(at.origin - surfels[winner].centre, TABLE_SIDE)];
+                                      + bin_of(-turn(at.frame, bin_vectors[bin]), TABLE_SIDE)];
             sum += weight * sent;
         }
     }

@@ -249,7 +249,6 @@ impl ImplicitVisibility {
                 receivers,
                 bin_vectors,
                 bin_radiance: &self.bin_radiance,
-                surfels: &self.trees.surfels,
                 node_radiosity: what.node_radiosity,
                 glossy_of_node: &self.gloss.glossy_of_node,
                 specular: what.specular.unwrap_or(&self.gloss.specular),
