@@ -59,6 +59,7 @@ struct State {
     norms: Vec<f32>,
     incident: Vec<Vec3>,
     parents: Vec<u32>,
+    scales: Vec<f32>,
     means: Vec<Vec3>,
     peaks: Vec<f32>,
 }
@@ -75,6 +76,7 @@ impl State {
             norms: context.download(&tables.cosine_norms).unwrap(),
             incident: entries(context, &tables.incident, tables.bin_count),
             parents: nodes.iter().map(|node| node.parent).collect(),
+            scales: context.download(&tables.scales).unwrap(),
             means: context.download(&tables.means).unwrap(),
             peaks: by_node(&context.download(&tables.peaks).unwrap(), tables.bin_count),
         }
@@ -101,6 +103,7 @@ impl State {
             sum += weight * arriving.max(lowest).as_dvec3();
             weights += weight;
         }
+        sum *= f64::from(self.scales[2 * leaf + side]);
         (specular_albedo(f0, f90, alpha, normal.dot(eye)) * sum / weights.max(DVec3::splat(1e-20))).max(DVec3::ZERO)
     }
 }

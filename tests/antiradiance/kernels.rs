@@ -37,12 +37,21 @@ fn links_and_transfers_agree_with_their_twins() {
         let sorted = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
         // Decisions at the very edge may fall either way in another order of rounding.
         let twin: BTreeSet<[u32; 2]> =
-            twins::links(&nodes, link_solid_angle(&settings)).into_iter().map(sorted).collect();
-        let pairs = context.download_range(&method.links().pairs, 0..method.links().count as usize).unwrap();
+            twins::pairs(&nodes, &leaves, link_solid_angle(&settings), 0.0)[0].iter().copied().map(sorted).collect();
+        let pairs = method.links().download(&context).unwrap();
         let found: BTreeSet<[u32; 2]> = pairs.iter().map(|p| sorted([p.x, p.y])).collect();
         assert_eq!(found.len(), pairs.len(), "{name}: no pair twice");
         let unlike = twin.symmetric_difference(&found).count();
         assert!(unlike * 1000 <= twin.len(), "{name}: {unlike} of {} links differ", twin.len());
+
+        let ends: Vec<[u32; 2]> = pairs.iter().map(|pair| pair.to_array()).collect();
+        let (scales, twin_scales) =
+            (context.download(&method.tables().scales).unwrap(), twins::scales(&nodes, &leaves, &ends));
+        let far_off =
+            |by: f32| scales.iter().zip(&twin_scales).filter(|(s, t)| (f64::from(by * **s) - **t).abs() > 2e-3).count();
+        // A direction within a leaf's plane may fall on either side.
+        assert!(far_off(1.0) * 100 <= scales.len(), "{name}: {} of {} scales differ", far_off(1.0), scales.len());
+        assert!(far_off(1.01) * 2 > scales.len(), "the comparison would see a hundredth");
 
         let norms: Vec<f32> = leaves.iter().map(|leaf| twins::cosine_norm(leaf.normal, bins)).collect();
         for (found, expected) in context.download(&method.tables().cosine_norms).unwrap().iter().zip(&norms) {
@@ -108,6 +117,7 @@ fn a_step_agrees_with_its_twin() {
         let before = entries(&context, &tables.exitant, tables.bin_count);
         let transfers = method.transfers().download(&context).unwrap();
         let means = context.download(&tables.means).unwrap();
+        let scales = context.download(&tables.scales).unwrap();
         let peaks = by_node(&context.download(&tables.peaks).unwrap(), tables.bin_count);
 
         let mut recorder = context.recorder("test").unwrap();
@@ -123,10 +133,11 @@ fn a_step_agrees_with_its_twin() {
             let row = leaf.node as usize * m..(leaf.node as usize + 1) * m;
             let albedo = [leaf.element, leaf.back_element].map(|e| albedo.get(e as usize).copied().unwrap_or_default());
             let source = [source[2 * index], source[2 * index + 1]];
-            let twin =
-                twins::local(leaf, norms[index], &bins.bins, &incident[row.clone()], source, albedo, |side, bin| {
-                    -undershoot * peaks[index * m + bin].max(1.0) * means[2 * index + side]
-                });
+            let scales = [scales[2 * index], scales[2 * index + 1]];
+            let lowest =
+                |side: usize, bin: usize| -undershoot * peaks[index * m + bin].max(1.0) * means[2 * index + side];
+            let row_in = &incident[row.clone()];
+            let twin = twins::local(leaf, norms[index], &bins.bins, row_in, (source, albedo, scales), lowest);
             irradiance.extend(twin.irradiance);
             radiosity.extend(twin.radiosity);
             expected[row].copy_from_slice(&twin.exitant);

@@ -49,6 +49,34 @@ fn the_furnace_gains_half_of_each_bounce() {
     }
 }
 
+/// Every leaf of a room that emits evenly receives the same, whatever nodes its links end at; without scales the edges of the room
+/// are too bright, and what lies away from them too dark.
+#[test]
+fn an_even_light_arrives_evenly() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("furnace"), Some(0.25));
+    let error = |even_receivers: bool| {
+        let mut method = prepare(&context, &fixture, Settings { refinement: 3.0, even_receivers, ..settings(128) });
+        let direct = solve(&context, &mut method, &fixture, 0).direct;
+        let mut errors: Vec<f32> = direct.iter().map(|e| e.x / PI - 1.0).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f32>() / errors.len() as f32).sqrt();
+        errors.sort_by(f32::total_cmp);
+        let at = |share: f32| 100.0 * errors[((errors.len() - 1) as f32 * share) as usize];
+        println!(
+            "{}, scaled {even_receivers}: off by {:.2} % rms, {:+.2} to {:+.2} % (all but a twentieth at each end {:+.2} to {:+.2})",
+            method.report(),
+            100.0 * rms,
+            at(0.0),
+            at(1.0),
+            at(0.05),
+            at(0.95)
+        );
+        rms
+    };
+    let (plain, even) = (error(false), error(true));
+    assert!(plain > 0.04 && even < 0.5 * plain, "{even} of {plain}");
+}
+
 /// Without light it is dark, and twice the light is twice the light.
 #[test]
 fn light_is_linear_and_darkness_is_dark() {

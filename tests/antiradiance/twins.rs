@@ -6,9 +6,9 @@ use linklight::stages::direction_bins::DirectionBins;
 use linklight::stages::hierarchy::{BLOCKS_BEHIND, NONE, REFLECTS_BEHIND};
 use std::f32::consts::PI;
 
-/// Unordered pairs of nodes that exchange light, by recursion.
-pub fn links(nodes: &[HierarchyNode], solid_angle: f32) -> Vec<[u32; 2]> {
-    let mut found = Vec::new();
+/// Unordered pairs of nodes that exchange light, by recursion; and those that would, if they were not back to back.
+pub fn pairs(nodes: &[HierarchyNode], leaves: &[HierarchyLeaf], solid_angle: f32, slack: f32) -> [Vec<[u32; 2]>; 2] {
+    let (mut found, mut back_to_back) = (Vec::new(), Vec::new());
     let mut stack = vec![(0, 0)];
     while let Some((a, b)) = stack.pop() {
         let (x, y) = (&nodes[a as usize], &nodes[b as usize]);
@@ -26,13 +26,54 @@ pub fn links(nodes: &[HierarchyNode], solid_angle: f32) -> Vec<[u32; 2]> {
         let allowed = if apart > 0.0 { solid_angle * apart * apart } else { 0.0 };
         let must_split = |node: &HierarchyNode| node.leaf == NONE && PI * node.radius * node.radius > allowed;
         match (must_split(x), must_split(y)) {
+            (false, false) if x.margin + y.margin == 0.0 && are_back_to_back(x, y, leaves, slack) => {
+                back_to_back.push([a, b])
+            }
             (false, false) => found.push([a, b]),
             (true, false) => stack.extend(children(nodes, a).map(|c| (c, b))),
             (true, true) if x.radius >= y.radius => stack.extend(children(nodes, a).map(|c| (c, b))),
             _ => stack.extend(children(nodes, b).map(|c| (a, c))),
         }
     }
-    found
+    [found, back_to_back]
+}
+
+/// Whether each of two flat nodes of solids is behind the other's surface, but for a share `slack` of its size.
+pub fn are_back_to_back(x: &HierarchyNode, y: &HierarchyNode, leaves: &[HierarchyLeaf], slack: f32) -> bool {
+    let (Some(a), Some(b)) = (leaves.get(x.shape as usize), leaves.get(y.shape as usize)) else { return false };
+    let slant = (1.0 - a.normal.dot(b.normal).powi(2)).max(0.0).sqrt();
+    let is_behind = |own: &HierarchyNode, leaf: &HierarchyLeaf, other: &HierarchyNode| {
+        leaf.flags & BLOCKS_BEHIND == 0 && leaf.normal.dot(other.center - own.center) <= other.radius * (slack - slant)
+    };
+    is_behind(x, a, y) && is_behind(y, b, x)
+}
+
+/// What an even light brings to each side of each leaf along `links`, at the leaf itself over what it brings as seen from the
+/// receivers.
+pub fn scales(nodes: &[HierarchyNode], leaves: &[HierarchyLeaf], links: &[[u32; 2]]) -> Vec<f64> {
+    let mut sums = vec![[0.0f64; 2]; 2 * leaves.len()];
+    for (sender, receiver) in links.iter().flat_map(|&[a, b]| [(a, b), (b, a)]) {
+        let (from, to) = (&nodes[sender as usize], &nodes[receiver as usize]);
+        let shape = leaves.get(from.shape as usize);
+        let looks_away =
+            |leaf: &HierarchyLeaf| leaf.flags & REFLECTS_BEHIND == 0 && leaf.normal.dot(to.center - from.center) <= 0.0;
+        if shape.is_some_and(looks_away) || to.center == from.center {
+            continue;
+        }
+        for own in nodes[receiver as usize..to.skip as usize].iter().filter(|own| own.leaf != NONE) {
+            let normal = leaves[own.leaf as usize].normal;
+            for (k, place) in [own.center, to.center].into_iter().enumerate() {
+                let offset = place - from.center;
+                let w = offset.normalize();
+                let turned = shape.map_or(0.5, |leaf| leaf.normal.dot(w).abs());
+                let disc = f64::from(from.area * turned / offset.length_squared() / PI);
+                let solid_angle = 2.0 * std::f64::consts::PI * (1.0 - 1.0 / (1.0 + disc).sqrt());
+                let side = 2 * own.leaf as usize + usize::from(normal.dot(w) > 0.0);
+                sums[side][k] += solid_angle * f64::from(normal.dot(w).abs());
+            }
+        }
+    }
+    sums.iter().map(|[here, there]| if *there > 0.0 { (here / there).clamp(0.5, 2.0) } else { 1.0 }).collect()
 }
 
 pub fn children(nodes: &[HierarchyNode], node: u32) -> impl Iterator<Item = u32> + '_ {
@@ -193,14 +234,13 @@ pub struct Local {
     pub exitant: Vec<DVec3>,
 }
 
-/// `incident`: the leaf's row. `albedo` and `source`: front and back. `lowest`: by side and bin.
+/// `incident`: the leaf's row. `source`, `albedo` and `scales` (of what links bring): front and back. `lowest`: by side and bin.
 pub fn local(
     leaf: &HierarchyLeaf,
     norm: f32,
     bins: &DirectionBins,
     incident: &[DVec3],
-    source: [Vec3; 2],
-    albedo: [Vec3; 2],
+    (source, albedo, scales): ([Vec3; 2], [Vec3; 2], [f32; 2]),
     lowest: impl Fn(usize, usize) -> Vec3,
 ) -> Local {
     let held = |w: Vec3| f64::from(discrete_cosine(leaf.normal.dot(w), norm, bins.count()));
@@ -211,6 +251,8 @@ pub fn local(
     for (bin, &w) in bins.directions.iter().enumerate() {
         irradiance[usize::from(leaf.normal.dot(w) > 0.0)] += solid_angle * held(w) * arriving(bin);
     }
+    irradiance[0] *= f64::from(scales[0]);
+    irradiance[1] *= f64::from(scales[1]);
     let reflects_behind = leaf.flags & REFLECTS_BEHIND != 0;
     if !reflects_behind {
         irradiance[1] = DVec3::ZERO;

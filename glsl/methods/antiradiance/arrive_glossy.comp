@@ -6,7 +6,7 @@
 
 // One thread per (glossy leaf, bin): radiance that arrives along the bin, not far below zero.     [Dachsbacher2007 4.2 local pass]
 // reads glossy_leaves[glossy_count], leaves, nodes, bin_directions, means, peaks, incident (pushed down to the parents of leaves),
-// environment[BIN_COUNT]   writes arrived[glossy_count * BIN_COUNT] (W m^-2 sr^-1; words as the tables')   shared none
+// environment[BIN_COUNT], scales[2 leaf_count] (of what links bring)   writes arrived[glossy_count * BIN_COUNT] (W m^-2 sr^-1; words as the tables')   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
@@ -19,6 +19,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer Peaks { float peaks[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer Environment { vec3 environment[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer Arrived { uint64_t arrived[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Scales { float scales[]; };
 layout(push_constant, scalar) uniform Params {
     uint glossy_count;
     uint leaf_count;
@@ -38,6 +39,8 @@ void main()
     uint leaf = glossy_leaves[i / BIN_COUNT], node = leaves[leaf].node, bin = i % BIN_COUNT;
     // What travels against the normal arrives at the front.
     bool at_front = dot(leaves[leaf].normal, BIN_DIRECTION(bin, BIN_COUNT)) <= 0.0;
-    vec3 value = glossy_arrival(leaf, node, nodes[node].parent, bin, means[2 * leaf + (at_front ? 0 : 1)]);
+    uint side = 2 * leaf + (at_front ? 0 : 1);
+    vec3 value = glossy_arrival(leaf, node, nodes[node].parent, bin, means[side]);
+    if (params.add_environment == 0) value *= scales[side];
     STORE_ENTRY(arrived, i, value)
 }

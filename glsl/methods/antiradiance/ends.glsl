@@ -5,6 +5,7 @@
 // (BinParams).
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
+#include "methods/antiradiance/solid_angle.glsl"
 
 const float FOUR_PI = 12.5663706143592;
 
@@ -20,13 +21,6 @@ End end_of(HierarchyNode node)
 {
     if (node.shape == NONE) return End(false, false, vec3(0.0), 0.0);
     return End(true, (leaves[node.shape].flags & BLOCKS_BEHIND) == 0, leaves[node.shape].normal, cosine_norms[node.shape]);
-}
-
-// Of a disc, seen from straight above, of that area over squared distance: never more than half of the sphere.
-float disc_solid_angle(float area)
-{
-    float ratio = area / (0.25 * FOUR_PI);
-    return 0.5 * FOUR_PI * (ratio / (sqrt(1.0 + ratio) * (sqrt(1.0 + ratio) + 1.0)));
 }
 
 // Whether light along v is on the sides of both ends that p_cos and q_cos say.

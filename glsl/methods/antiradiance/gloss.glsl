@@ -2,7 +2,7 @@
 #define GLOSS
 // Specular reflection of a leaf towards a direction, from its incident bins.
 // The kernel declares WORDS and BIN_COUNT, binds leaves, nodes, gloss[leaf_count], cosine_norms, bin_directions, incident,
-// means, peaks, has params.leaf_count, params.node_count and params.undershoot, and
+// means, peaks, scales, has params.leaf_count, params.node_count and params.undershoot, and
 // defines
 //     vec3 beside(uint bin)       radiance that arrives beside what the table holds
 #include "lib/direction_bins.glsl"
@@ -22,7 +22,8 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
     vec3 normal = side * own.normal;
     Surface s = glossy_surface(gloss[leaf], normal);
     uint parent = nodes[own.node].parent;
-    vec3 mean = means[2 * leaf + (side > 0.0 ? 0 : 1)];
+    uint own_side = 2 * leaf + (side > 0.0 ? 0 : 1);
+    vec3 mean = means[own_side];
 
     vec3 sum = vec3(0.0), weights = vec3(0.0);
     for (uint bin = 0; bin < BIN_COUNT; ++bin) {
@@ -33,7 +34,7 @@ vec3 glossy_radiance(uint leaf, vec3 to_eye)
         sum += weight * glossy_arrival(leaf, own.node, parent, bin, mean);
         weights += weight;
     }
-    vec3 within = sum / max(weights, vec3(1e-20));
+    vec3 within = scales[own_side] * sum / max(weights, vec3(1e-20));
     return max(specular_albedo(s, dot(normal, to_eye)) * within, vec3(0.0));
 }
 #endif

@@ -5,7 +5,7 @@
 // One thread per leaf: its irradiance from the parts, what its sides reflect of it, and how much that changes what a plain one
 // sends (see plain.glsl; over a side, cosine times solid angle sums to pi).     [Dachsbacher2007 4.2 local pass, Eq. 18]
 // reads parts[part_count * 2 * leaf_count] (W/m2), leaves, source[2 leaf_count] (radiosity that needs no transport, W/m2, front
-//       and back), leaf_albedo[2 leaf_count], glossy_of_leaf[leaf_count]
+//       and back), leaf_albedo[2 leaf_count], glossy_of_leaf[leaf_count], scales[2 leaf_count] (of what links bring)
 // updates radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1)   writes irradiance[2 leaf_count] (W/m2),
 //         light_changes[leaf_count] (W: how much the light that plain fronts send changed, how much there is)   shared none
 layout(local_size_x = 64) in;
@@ -18,9 +18,11 @@ layout(set = 0, binding = 5, scalar) buffer Means { vec3 means[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer GlossyOfLeaf { uint glossy_of_leaf[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer LightChanges { vec2 light_changes[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Scales { float scales[]; };
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint part_count;
+    uint is_linked;             // 0: the environment's light is in it, which no link brought
     uint update_radiosity;      // 0: reflected light stays as it is, antiradiance alone goes on
     uint sets_floor;            // 1: what arrives now sets how far below zero later light may fall
     uint is_undamped;
@@ -46,6 +48,10 @@ void main()
         means[2 * leaf + 1] = max(means[2 * leaf + 1], back / PI);
     }
     if (!reflects_behind) back = vec3(0.0);
+    if (params.is_linked != 0) {
+        front *= scales[2 * leaf];
+        back *= scales[2 * leaf + 1];
+    }
     irradiance[2 * leaf] = front;
     irradiance[2 * leaf + 1] = back;
     vec3 before = radiosity[2 * leaf], after = before;

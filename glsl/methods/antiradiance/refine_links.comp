@@ -6,17 +6,23 @@
 // One thread per node pair of a step: a node with itself becomes all pairs of its children; two nodes become a link when
 // neither is larger than a direction bin as seen from the other, or cannot be split; else the larger one is split.
 //                                                                                            [Dachsbacher2007 3.2]
-// reads nodes, taken_pairs   updates counters, pair_stack   writes links[capacity] (pairs of nodes, both directions)   shared none
-// Differs from [Dachsbacher2007]: leaves of one flat surface are not linked, they never see each other.
+// reads nodes, leaves, taken_pairs   updates counters, pair_stack   writes links, links_1, links_2, links_3 (pairs of nodes, both
+// directions, one after the other: part_capacity each)   shared none
+// Differs from [Dachsbacher2007]: leaves of one flat surface are not linked, they never see each other; nor are solids back to back.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Taken { uvec2 taken_pairs[]; };
 layout(set = 0, binding = 2, scalar) buffer Counters { PairCounters counters[]; };
 layout(set = 0, binding = 3, scalar) writeonly buffer Stack { uvec2 pair_stack[]; };
 layout(set = 0, binding = 4, scalar) writeonly buffer Links { uvec2 links[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer Links1 { uvec2 links_1[]; };
+layout(set = 0, binding = 6, scalar) writeonly buffer Links2 { uvec2 links_2[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Links3 { uvec2 links_3[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
 layout(push_constant, scalar) uniform Params {
     float solid_angle;      // of a node that need not be split, sr
     uint capacity;          // links that fit; the counter goes on beyond
+    uint part_capacity;     // of each buffer of links
 } params;
 
 const float PI = 3.14159265358979;
@@ -44,6 +50,27 @@ void split(uint node, uint other)
     for (uint child = node + 1; child < end; child = nodes[child].skip) pair_stack[slot++] = uvec2(child, other);
 }
 
+// Whether two flat nodes at rest each have the other behind a solid's surface: neither receives anything.
+bool are_back_to_back(uvec2 pair, vec3 offset, vec2 radius)
+{
+    uvec2 shape = uvec2(nodes[pair.x].shape, nodes[pair.y].shape);
+    if (shape.x == NONE || shape.y == NONE) return false;
+    if (((leaves[shape.x].flags | leaves[shape.y].flags) & BLOCKS_BEHIND) != 0) return false;
+    vec3 x = leaves[shape.x].normal, y = leaves[shape.y].normal;
+    float cosine = dot(x, y), slant = sqrt(max(1.0 - cosine * cosine, 0.0));
+    // How far the sphere around a flat node reaches along the other's normal.
+    return dot(x, offset) <= -radius.y * slant && dot(y, offset) >= radius.x * slant;
+}
+
+void add_link(uint slot, uvec2 pair)
+{
+    uint part = slot / params.part_capacity, at = slot % params.part_capacity;
+    if (part == 0) links[at] = pair;
+    else if (part == 1) links_1[at] = pair;
+    else if (part == 2) links_2[at] = pair;
+    else links_3[at] = pair;
+}
+
 void main()
 {
     uint i = linear_index();
@@ -58,14 +85,16 @@ void main()
     }
 
     // Of the sphere around everything below, at the least distance that the two may come to.
-    float apart = distance(nodes[pair.x].center, nodes[pair.y].center) - nodes[pair.x].margin - nodes[pair.y].margin;
-    float allowed = apart > 0.0 ? params.solid_angle * apart * apart : 0.0;
+    vec3 offset = nodes[pair.y].center - nodes[pair.x].center;
     vec2 radius = vec2(nodes[pair.x].radius, nodes[pair.y].radius);
+    float margin = nodes[pair.x].margin + nodes[pair.y].margin, apart = length(offset) - margin;
+    float allowed = apart > 0.0 ? params.solid_angle * apart * apart : 0.0;
     bvec2 must_split = bvec2(nodes[pair.x].leaf == NONE && PI * radius.x * radius.x > allowed,
                              nodes[pair.y].leaf == NONE && PI * radius.y * radius.y > allowed);
     if (!must_split.x && !must_split.y) {
+        if (margin == 0.0 && are_back_to_back(pair, offset, radius)) return;
         uint slot = atomicAdd(counters[0].accepted, 1);
-        if (slot < params.capacity) links[slot] = pair;
+        if (slot < params.capacity) add_link(slot, pair);
     } else if (must_split.x && (!must_split.y || radius.x >= radius.y)) {
         split(pair.x, pair.y);
     } else {

@@ -8,7 +8,7 @@
 // One thread per glossy leaf: the irradiance that, reflected evenly as the display does, gives what its specular lobe sends
 // to the eye besides its diffuse light.
 // reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, peaks, incident, positions,
-// albedo, members, back_elements[vertex_count],
+// scales[2 leaf_count] (of what links bring), albedo, members, back_elements[vertex_count],
 // irradiance[element_count] (W/m2)   updates shown[element_count] (W/m2; of glossy leaves)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
@@ -28,6 +28,7 @@ layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer Peaks { float peaks[]; };
 layout(set = 0, binding = 13, scalar) readonly buffer Members { uint members[]; };
 layout(set = 0, binding = 14, scalar) readonly buffer BackElements { uint back_elements[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer Scales { float scales[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0.
 layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; uint leaf_count; uint node_count; float undershoot; } params;
 

@@ -47,11 +47,13 @@ impl Antiradiance {
         let (sent, incident) = (context.download(&kept.exitant)?, context.download(&self.tables.incident)?);
         let (means, peaks) = (context.download(&self.tables.means)?, context.download(&self.tables.peaks)?);
         let (leaves, norms) = (context.download(&self.hierarchy.leaves)?, context.download(&self.tables.cosine_norms)?);
+        let scales = context.download(&self.tables.scales)?;
         let of = |table: &[u64], at: usize| entry(&table[at * words..(at + 1) * words]);
 
         let mut of_sides: BTreeMap<Side, (BTreeMap<u32, Vec3>, Vec3)> = BTreeMap::new();
         for (side, Receiver { leaf, nodes, is_back }) in receivers {
             let (normal, mean) = (leaves[leaf].normal, means[2 * leaf + usize::from(is_back)]);
+            let scale = if kept.step.has_environment { 1.0 } else { scales[2 * leaf + usize::from(is_back)] };
             let mut senders: BTreeMap<u32, Vec3> = BTreeMap::new();
             let mut floor = Vec3::ZERO;
             for (bin, direction) in bins.directions.iter().enumerate() {
@@ -61,7 +63,7 @@ impl Antiradiance {
                     continue;
                 }
                 let weight = norms[leaf] * cosine.abs().max(0.5 / (bins.count() as f32).sqrt());
-                let weight = weight * 4.0 * PI / bins.count() as f32;
+                let weight = weight * scale * 4.0 * PI / bins.count() as f32;
                 let mut told = Vec3::ZERO;
                 for &node in &nodes {
                     for &(from, share) in cells.get(&((bin * node_count) as u32 + node)).into_iter().flatten() {

@@ -93,6 +93,7 @@ impl Gloss {
             peaks: &tables.peaks,
             incident: &tables.incident,
             environment: &tables.environment,
+            scales: &tables.scales,
             arrived: &self.arrived,
             constants: passes::ArriveGlossyConstants { words, bin_count },
             params: passes::ArriveGlossyParams {
@@ -202,6 +203,7 @@ impl Antiradiance {
             means: &tables.means,
             peaks: &tables.peaks,
             incident: &tables.incident,
+            scales: &tables.scales,
             positions: &world.positions,
             albedo: &self.elements.albedo,
             irradiance: self.indirect_irradiance(),

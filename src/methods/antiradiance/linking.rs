@@ -1,31 +1,27 @@
-//! Links between nodes, and what they transfer: sparse rows over (bin, receiver), built on the device.
+//! What links transfer: sparse rows over (bin, receiver), built on the device.
 //!
 //! A row is a cell: one bin of one receiver. Rows of one bin and of like length lie side by side in slices ([Kreutzer2014]),
 //! so that what threads side by side read lies side by side, and what a bin's rows read of the table stays in caches.
 //!
 //! [Kreutzer2014]: crate::methods::PAPERS
 
+use super::links::NodeLinks;
 use super::{Settings, Tables};
 use crate::gpu::shaders::methods::antiradiance as passes;
-use crate::gpu::shaders::types::{BinParams, FoundTransfer, PairCounters};
+use crate::gpu::shaders::types::{BinParams, FoundTransfer};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Threads};
 use crate::stages::direction_bins::{DeviceBins, Spread};
 use crate::stages::hierarchy::{Hierarchy, NONE};
-use crate::stages::pair_queue::{PairQueue, PairQueueError, PairQueuePlan};
+use crate::stages::pair_queue::PairQueueError;
 use crate::stages::scan::{self, ScanScratch};
 use glam::UVec2;
 use std::collections::HashMap;
-use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Pairs of one step of the queue.
-const QUEUE_BATCH: u32 = 8192;
 /// Cells of a slice and classes of cells by length, in `slices.glsl`; nodes of one workgroup, in its kernels.
 const SLICE: u32 = 32;
 const LENGTH_CLASSES: usize = 48;
 const WORKGROUP_NODES: u32 = 1024;
-/// Links a leaf that a first attempt has room for.
-const FIRST_GUESS: u64 = 64;
 /// Transfers of a link, both ways, that are kept from counting to filling; where there are more, they are made twice.
 const FOUND_A_LINK: u64 = 6;
 const TRANSFER_BYTES: u64 = 8;
@@ -46,59 +42,6 @@ pub enum LinkingError {
         "{0} transfers are more than can be counted, or one bin's than one buffer holds; lower --elements or raise refinement"
     )]
     TooMany(u64),
-}
-
-/// Pairs of nodes that exchange light, in no order.
-pub struct NodeLinks {
-    /// `count` are in use.
-    pub pairs: Buffer<UVec2>,
-    pub count: u32,
-    /// What the queue counted.
-    pub counters: PairCounters,
-}
-
-impl NodeLinks {
-    /// Refines from the root's link to itself.                                     [Dachsbacher2007 3.2]
-    pub fn refine(
-        context: &Context,
-        hierarchy: &Hierarchy,
-        solid_angle: f32,
-        budget: u64,
-    ) -> Result<Self, LinkingError> {
-        // A node of four children with itself: six pairs and four selves.
-        let mut plan =
-            PairQueuePlan { batch: QUEUE_BATCH, max_children: 10, levels: 2 * hierarchy.plan.depth() + 1, seeds: 1 };
-        while plan.bytes_needed() > context.limits().storage_buffer_bytes && plan.batch > 1 {
-            plan.batch /= 2;
-        }
-        let queue = PairQueue::new(context, "antiradiance", plan)?;
-        let link_bytes = size_of::<UVec2>() as u64;
-        let available = budget.min(context.limits().storage_buffer_bytes);
-        let mut capacity = (FIRST_GUESS * u64::from(hierarchy.leaf_count())).max(1024).min(available / link_bytes);
-        let seeds: &[UVec2] = if hierarchy.node_count() > 0 { &[UVec2::ZERO] } else { &[] };
-        loop {
-            let pairs = context.buffer("antiradiance/links", capacity as usize)?;
-            let counters = queue.refine(context, "links", seeds, |recorder| {
-                let pass = passes::RefineLinks {
-                    nodes: &hierarchy.nodes,
-                    taken_pairs: &queue.taken,
-                    counters: &queue.counters,
-                    pair_stack: &queue.stack,
-                    links: &pairs,
-                    params: passes::RefineLinksParams { solid_angle, capacity: capacity as u32 },
-                };
-                recorder.dispatch_indirect(&pass, &queue.groups);
-            })?;
-            let needed = u64::from(counters.accepted);
-            if needed <= capacity {
-                return Ok(Self { pairs, count: counters.accepted, counters });
-            }
-            if needed * link_bytes > available {
-                return Err(LinkingError::OutOfMemory { what: "links", needed: needed * link_bytes, available });
-            }
-            capacity = needed;
-        }
-    }
 }
 
 /// The transfers of consecutive bins.
@@ -274,8 +217,8 @@ impl Making<'_> {
         let capacity = room.min(FOUND_A_LINK * u64::from(self.links.count)) as u32;
         let transfers = context.buffer("antiradiance/found transfers", capacity as usize)?;
         let found_count = context.upload("antiradiance/found count", &[0u32])?;
-        let pass = passes::CountTransfers {
-            links: &self.links.pairs,
+        let pass_of = |links, link_count| passes::CountTransfers {
+            links,
             nodes: &hierarchy.nodes,
             leaves: &hierarchy.leaves,
             cosine_norms: self.cosine_norms,
@@ -287,14 +230,16 @@ impl Making<'_> {
             found: &transfers,
             params: passes::CountTransfersParams {
                 bins: self.params,
-                link_count: self.links.count,
+                link_count,
                 node_count: hierarchy.node_count(),
                 capacity,
             },
         };
         let mut recorder = context.recorder("links")?;
         recorder.fill(cells, 0);
-        recorder.dispatch(&pass, self.links.count);
+        for (links, link_count) in self.links.parts() {
+            recorder.dispatch(&pass_of(links, link_count), link_count);
+        }
         recorder.submit()?;
         let count = context.download(&found_count)?[0];
         Ok((count <= capacity).then_some(Found { transfers, count }))
@@ -320,7 +265,11 @@ impl Making<'_> {
         let mut recorder = context.recorder("links")?;
         recorder.fill(&window.transfers, 0);
         match found {
-            None => recorder.dispatch(&self.fill_anew(made, window), self.links.count),
+            None => {
+                for (links, link_count) in self.links.parts() {
+                    recorder.dispatch(&self.fill_anew(made, window, (links, link_count)), link_count);
+                }
+            }
             Some(found) => {
                 let pass = passes::PlaceTransfers {
                     found: &found.transfers,
@@ -341,10 +290,15 @@ impl Making<'_> {
     }
 
     /// The transfers of a window, made from the links once more.
-    fn fill_anew<'a>(&'a self, made: &'a Transfers, window: &'a TransferWindow) -> passes::FillTransfers<'a> {
+    fn fill_anew<'a>(
+        &'a self,
+        made: &'a Transfers,
+        window: &'a TransferWindow,
+        (links, link_count): (&'a Buffer<UVec2>, u32),
+    ) -> passes::FillTransfers<'a> {
         let (hierarchy, bins) = (self.hierarchy, self.bins);
         passes::FillTransfers {
-            links: &self.links.pairs,
+            links,
             nodes: &hierarchy.nodes,
             leaves: &hierarchy.leaves,
             cosine_norms: self.cosine_norms,
@@ -355,7 +309,7 @@ impl Making<'_> {
             transfers: &window.transfers,
             params: passes::FillTransfersParams {
                 bins: self.params,
-                link_count: self.links.count,
+                link_count,
                 node_count: hierarchy.node_count(),
                 first_bin: window.bins.start,
                 end_bin: window.bins.end,
@@ -463,11 +417,6 @@ fn plan_windows(ends: &[u32], largest: u64) -> Result<Vec<Range<u32>>, LinkingEr
         windows.push(own);
     }
     Ok(windows)
-}
-
-/// Solid angle that a node of a link may have, of a bin's.
-pub fn link_solid_angle(settings: &Settings) -> f32 {
-    settings.refinement * 4.0 * PI / settings.bins.get() as f32
 }
 
 #[cfg(test)]

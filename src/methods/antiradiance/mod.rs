@@ -30,7 +30,8 @@
 //! samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance may not fall
 //! far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes are nodes of their
 //! own; near senders are discs, never more than
-//! half of the sphere; links are made on the device. A patch of a flat part is made of the cells of its vertices, one or many
+//! half of the sphere; links are made on the device, none between solids back to back; what a leaf receives along links of
+//! the nodes above is scaled to what an even light would bring to the leaf itself (selectable). A patch of a flat part is made of the cells of its vertices, one or many
 //! ([`Settings::leaves`]). Direct light of punctual lights and sampled emitters is that of shadow rays.
 //! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
@@ -41,6 +42,7 @@ mod bin_count;
 mod carried;
 mod gloss;
 mod linking;
+mod links;
 mod report;
 mod scheme;
 mod settings;
@@ -49,7 +51,8 @@ mod views;
 
 pub use bin_count::BinCount;
 pub use gloss::Gloss;
-pub use linking::{LinkingError, NodeLinks, TransferWindow, Transfers, link_solid_angle};
+pub use linking::{LinkingError, TransferWindow, Transfers};
+pub use links::{NodeLinks, link_solid_angle};
 pub use report::Report;
 pub use scheme::{Residual, growth_rate};
 pub use settings::{Backs, Leaves, Scheme, Settings};
@@ -187,6 +190,7 @@ impl Antiradiance {
         recorder.submit()?;
 
         let links = NodeLinks::refine(context, &hierarchy, link_solid_angle(&settings), budget)?;
+        links.even_out(context, &hierarchy, &settings, &tables.scales)?;
         let transfers = Transfers::new(context, &links, &hierarchy, &bins, &tables.cosine_norms, &settings, budget)?;
         let mut method = Self {
             report: Report::new(&settings, &elements, &emitters, &hierarchy, &links, &transfers),
@@ -229,6 +233,7 @@ impl Antiradiance {
         if !standing_links {
             self.links = NodeLinks::refine(context, &self.hierarchy, link_solid_angle(&self.settings), u64::MAX)?;
         }
+        self.links.even_out(context, &self.hierarchy, &self.settings, &self.tables.scales)?;
         // The old ones go first: two sets may not fit.
         self.transfers.windows.clear();
         self.transfers = Transfers::new(

@@ -53,7 +53,7 @@ impl Report {
             transfers: transfers.count,
             transfer_windows: transfers.windows.len() as u32,
             table_bytes: 2 * Tables::table_bytes(nodes, bins, settings.half_tables),
-            link_bytes: transfers.size_bytes() + links.pairs.size_bytes(),
+            link_bytes: transfers.size_bytes() + links.size_bytes(),
             sampled_parts: emitters.plan.sampled_parts,
             linked_parts: emitters.plan.linked_parts,
         }

@@ -32,7 +32,8 @@ pub struct Tables {
     pub is_environment_black: bool,
     /// Per leaf: scale of its cosines.
     pub cosine_norms: Buffer<f32>,
-    /// Two per leaf from here on, front and back.
+    /// Two per leaf from here on, front and back. Scale of what links bring, 1: see [`super::NodeLinks::even_out`].
+    pub scales: Buffer<f32>,
     pub albedo: Buffer<Vec3>,
     /// W/m2. Radiosity without transport.
     pub source: Buffer<Vec3>,
@@ -114,6 +115,7 @@ impl Tables {
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
             is_environment_black: environment.is_black(),
             cosine_norms: context.buffer("antiradiance/cosine norms", leaves)?,
+            scales: context.buffer("antiradiance/scales", sides)?,
             albedo: context.buffer("antiradiance/leaf albedo", sides)?,
             source: context.buffer("antiradiance/source", sides)?,
             radiosity: context.buffer("antiradiance/radiosity", sides)?,
@@ -257,9 +259,11 @@ impl Tables {
             irradiance: &self.irradiance,
             glossy_of_leaf: &self.gloss.glossy_of_leaf,
             light_changes: &self.light_changes,
+            scales: &self.scales,
             params: passes::LocalReflectParams {
                 leaf_count,
                 part_count,
+                is_linked: u32::from(!step.has_environment),
                 update_radiosity: u32::from(step.reflects),
                 sets_floor,
                 is_undamped,

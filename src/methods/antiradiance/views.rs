@@ -120,7 +120,7 @@ impl Antiradiance {
         let plan = &self.hierarchy.plan;
         let own = plan.leaves[leaf as usize].node;
         let is_above = |node: u32| (node..plan.nodes[node as usize].skip).contains(&own);
-        let pairs = context.download_range(&self.links.pairs, 0..self.links.count as usize)?;
+        let pairs = self.links.download(context)?;
         for pair in pairs {
             let other = match (is_above(pair.x), is_above(pair.y)) {
                 (true, _) => pair.y,
