@@ -87,10 +87,12 @@ fn device_ms(records: &[PassRecord], names: &[&str]) -> f64 {
 
 const LOCAL_PASSES: [&str; 4] = ["/local_irradiance", "/local_reflect", "/local_exitant", "/local_residual"];
 
-const LINK_PASSES: [&str; 14] = [
+const LINK_PASSES: [&str; 16] = [
     "choose",
     "take",
     "refine_links",
+    "even_light",
+    "even_scales",
     "count_transfers",
     "count_cells",
     "list_cells",
