@@ -38,18 +38,23 @@ float smith_root(float cosine, float alpha)
 
 bool has_specular(Surface s) { return s.f90 > 0.0 || s.f0 != vec3(0.0); }
 
-// Reflected radiance per arriving irradiance, sr^-1; the cosine towards the light is the caller's.
-vec3 brdf_value(Surface s, vec3 to_eye, vec3 to_light)
+// Reflected radiance per arriving irradiance, sr^-1, of either lobe; the cosine towards the light is the caller's.
+struct LobeValues {
+    vec3 diffuse;
+    vec3 specular;
+};
+
+LobeValues brdf_lobes(Surface s, vec3 to_eye, vec3 to_light)
 {
     float cos_light = dot(s.normal, to_light);
-    if (!s.reflects || cos_light <= 0.0) return vec3(0.0);
-    if (!has_specular(s)) return s.albedo / PI;
+    if (!s.reflects || cos_light <= 0.0) return LobeValues(vec3(0.0), vec3(0.0));
+    if (!has_specular(s)) return LobeValues(s.albedo / PI, vec3(0.0));
 
     to_eye = folded_eye(s.normal, to_eye);
     float cos_eye = max(dot(s.normal, to_eye), 1e-6);
     vec3 sum = to_eye + to_light;
     float squared = dot(sum, sum);
-    if (squared < 1e-12) return s.albedo / PI;
+    if (squared < 1e-12) return LobeValues(s.albedo / PI, vec3(0.0));
     vec3 halfway = sum / sqrt(squared);
 
     vec3 fresnel = schlick_fresnel(s, dot(to_eye, halfway));
@@ -57,7 +62,14 @@ vec3 brdf_value(Surface s, vec3 to_eye, vec3 to_light)
     float specular = ggx_distribution(s.normal, halfway, s.alpha) * shadowing;
     // What the upper layer reflects does not reach the lower one.          [KHR_materials_specular, "dielectric_brdf"]
     float passed = 1.0 - max(fresnel.r, max(fresnel.g, fresnel.b));
-    return s.albedo * (passed / PI) + fresnel * specular;
+    return LobeValues(s.albedo * (passed / PI), fresnel * specular);
+}
+
+// Of both.
+vec3 brdf_value(Surface s, vec3 to_eye, vec3 to_light)
+{
+    LobeValues lobes = brdf_lobes(s, to_eye, to_light);
+    return lobes.diffuse + lobes.specular;
 }
 
 // Share of samples that the specular lobe gets: what it reflects of all that is reflected, roughly.
@@ -72,22 +84,27 @@ float specular_share(Surface s, float cos_eye)
     return clamp(specular / (specular + diffuse), 0.1, 0.9);
 }
 
+// Density with which the specular lobe draws `to_light`, sr^-1: visible normals D G1 (v.h) / (n.v), and
+// dh / dl = 1 / (4 v.h). The eye is above the plane.
+float specular_density(Surface s, vec3 to_eye, vec3 to_light)
+{
+    vec3 sum = to_eye + to_light;
+    float squared = dot(sum, sum);
+    if (squared < 1e-12) return 0.0;
+    vec3 halfway = sum / sqrt(squared);
+    float cos_eye = dot(s.normal, to_eye);
+    float visible = ggx_distribution(s.normal, halfway, s.alpha) * 0.5 / (cos_eye + smith_root(cos_eye, s.alpha));
+    return dot(s.normal, halfway) > 0.0 ? visible : 0.0;
+}
+
 // Density with which brdf_sample draws `to_light`, sr^-1.
 float brdf_density(Surface s, vec3 to_eye, vec3 to_light)
 {
     float cos_light = dot(s.normal, to_light);
     to_eye = folded_eye(s.normal, to_eye);
-    float cos_eye = dot(s.normal, to_eye);
-    float share = specular_share(s, cos_eye);
+    float share = specular_share(s, dot(s.normal, to_eye));
     float density = (1.0 - share) * max(cos_light, 0.0) / PI;
-    vec3 sum = to_eye + to_light;
-    float squared = dot(sum, sum);
-    if (share == 0.0 || squared < 1e-12) return density;
-
-    // Visible normals D G1 (v.h) / (n.v), and dh / dl = 1 / (4 v.h).
-    vec3 halfway = sum / sqrt(squared);
-    float visible = ggx_distribution(s.normal, halfway, s.alpha) * 0.5 / (cos_eye + smith_root(cos_eye, s.alpha));
-    return density + (dot(s.normal, halfway) > 0.0 ? share * visible : 0.0);
+    return share == 0.0 ? density : density + share * specular_density(s, to_eye, to_light);
 }
 
 // A microfacet normal about +z out of those that `eye` sees.                                    [Dupuy2023]
@@ -103,14 +120,19 @@ vec3 visible_normal(vec3 eye, float alpha, vec2 u)
     return normal / sqrt(dot(normal, normal));
 }
 
-// A direction for light to come from, in proportion to the reflected radiance, nearly. It may lie below the plane of
-// the normal, where nothing is reflected.
+// A direction for light to come from, in proportion to what the specular lobe reflects, nearly. The eye is above the plane.
+vec3 specular_sample(Surface s, vec3 to_eye, vec2 u)
+{
+    mat3 basis = basis_of(s.normal);
+    vec3 halfway = basis * visible_normal(to_eye * basis, s.alpha, u);
+    return 2.0 * dot(to_eye, halfway) * halfway - to_eye;
+}
+
+// ... to what both lobes reflect. It may lie below the plane of the normal, where nothing is reflected.
 vec3 brdf_sample(Surface s, vec3 to_eye, float lobe, vec2 u)
 {
     to_eye = folded_eye(s.normal, to_eye);
-    mat3 basis = basis_of(s.normal);
-    if (lobe >= specular_share(s, dot(s.normal, to_eye))) return basis * cosine_hemisphere(u);
-    vec3 halfway = basis * visible_normal(to_eye * basis, s.alpha, u);
-    return 2.0 * dot(to_eye, halfway) * halfway - to_eye;
+    if (lobe >= specular_share(s, dot(s.normal, to_eye))) return basis_of(s.normal) * cosine_hemisphere(u);
+    return specular_sample(s, to_eye, u);
 }
 #endif

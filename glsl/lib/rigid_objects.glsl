@@ -121,8 +121,17 @@ float rigid_visibility(SurfaceMapFrame frame, RigidPoint sender, RigidPoint rece
     return free;
 }
 
-// Pixels around a look-up from outside that must agree: half a step between directions moves the object's rim by so many.
-const float OUTSIDE_DOUBT = 5.0;
+// Pixels around a look-up from outside that must agree: the direction of a map lies up to half a cell's diagonal from the
+// way's own, which moves what stands at the rim of the object's ball by 2.8 of its 64 pixels.
+const float OUTSIDE_DOUBT = 3.5;
+
+// A look-up of five pixels in the map of the way's own direction, then of the pixel itself in those of four others around.
+vec4 outside_shift(uint look_up)
+{
+    if (look_up == 0) return vec4(0.0);
+    vec2 side = vec2(look_up & 1, look_up >> 1 & 1) - 0.5;
+    return look_up < 5 ? vec4(2.0 * OUTSIDE_DOUBT * side, 0.0, 0.0) : vec4(0.0, 0.0, side);
+}
 
 // Whether all that the maps tell of the way from a sender to a receiver is beyond doubt: the four pixels around agree in
 // either's map, and so do the pixels and directions around in the maps from outside; `is_free` is what they say.
@@ -140,11 +149,9 @@ bool rigid_is_sure(SurfaceMapFrame frame, RigidPoint sender, RigidPoint receiver
         o = rigid_object(k);
         vec3 a = at_rest(o, sender.position), b = at_rest(o, receiver.position);
         uint blocked = 0;
-        for (uint corner = 0; corner < 5; ++corner) {
-            vec2 side = corner < 4 ? vec2(corner & 1, corner >> 1) - 0.5 : vec2(0.0);
-            if (outside_blocks(k, o, a, b, vec4(OUTSIDE_DOUBT * side, side.y, -side.x))) ++blocked;
-        }
-        if (blocked != 0 && blocked != 5) return false;
+        for (uint look_up = 0; look_up < 9; ++look_up)
+            if (outside_blocks(k, o, a, b, outside_shift(look_up))) ++blocked;
+        if (blocked != 0 && blocked != 9) return false;
         is_free = blocked == 0;
     }
     return true;

@@ -2,10 +2,9 @@
 #define LIB_SENDER_GATHER
 // What a receiver takes from the nodes of its cut: the oracle of the walk, and the light of a node by one of its leaves.
 // The kernel binds the tables of lib/sender_tree.glsl and lib/sender_leaf.glsl.
-#include "lib/polygon.glsl"
 #include "lib/random.glsl"
-#include "lib/receiver.glsl"
 #include "lib/sender_leaf.glsl"
+#include "lib/sender_point.glsl"
 #include "lib/sender_walk.glsl"
 #include "lib/tone_curve.glsl"
 
@@ -21,10 +20,8 @@ struct GatherOptions {
 };
 GatherOptions options;
 
-// Leaves nearer than this many of their radii are measured as polygons, farther ones as points: off by 1 % at most.
-const float NEAR_RADII = 5.0;
-
 Receiver receiver;
+vec3 lobe_draw;         // 0..1, of all senders alike: what of the specular lobe misses one of them hits another
 float slack;            // how far rounding may have moved the receiver, metres
 float shown;            // what the pixel shows so far, as the display encodes it
 float shown_luminance;
@@ -93,6 +90,16 @@ bool is_worth_asking(inout Arrival arrival, float u)
     return true;
 }
 
+// How far before a leaf's own surface a way to it ends, metres: a hit there is rounded by the coordinates of the triangle's
+// corners and of both ends, which are at most as large as the tree reaches. Those of the leaf itself say nothing: a floor
+// about the origin shadowed itself there.                                                  As in lib/offset.glsl.
+float end_offset()
+{
+    SenderFrame frame = sender_frame();
+    vec3 reach = max(max(abs(frame.low), abs(frame.low + frame.extent)), abs(receiver.position));
+    return max(reach.x, max(reach.y, reach.z)) * (1.0 / 524288.0);
+}
+
 // The light of a node of the cut, by a leaf that is drawn from it, or by its representative; `chance` is left over.
 Arrival arrival_of(uint node, uvec4 random, out float chance)
 {
@@ -117,42 +124,12 @@ Arrival arrival_of(uint node, uvec4 random, out float chance)
     Arrival none = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), slot);
     SenderLeaf leaf = sender_shape(slot);
     vec3 sender_normal = leaf_normal(leaf);
-    vec3 target = options.jitter ? leaf_point(leaf, u.xy) : leaf.centre;
-    vec3 to_target = target - receiver.position;
     // A leaf in the receiver's own plane is not in front of it, whatever rounding says.
-    if (-dot(sender_normal, to_target) <= slack) return none;
-
-    vec3 normal = receiver.surface.normal;
-    float squared = dot(to_target, to_target);
-    float radius_squared = max(dot(leaf.edge_u, leaf.edge_u), dot(leaf.edge_v, leaf.edge_v));
-    float cos_receiver = dot(normal, to_target), cos_sender = -dot(sender_normal, to_target);
-    float form_factor = max(cos_receiver, 0.0) * cos_sender * leaf_area(leaf) / (PI * squared * squared);
-    float exact = form_factor;
-    if (squared < NEAR_RADII * NEAR_RADII * radius_squared) {
-        vec3 corners[4];
-        uint count = leaf_corners(leaf, corners);
-        for (uint k = 0; k < 4; ++k) corners[k] -= receiver.position;
-        SeenPolygon seen = seen_polygon(corners, count, normal);
-        exact = seen.form_factor;
-        // Of a leaf that the horizon cuts, the part above it sends.
-        if (cos_receiver <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) {
-            to_target = seen.middle;
-            target = receiver.position + to_target;
-            squared = dot(to_target, to_target);
-            form_factor = exact;
-        }
-    }
-    if (options.clamp_radii > 0.0)
-        form_factor = min(form_factor * min(squared / (options.clamp_radii * options.clamp_radii * radius_squared), 1.0), exact);
-    else
-        form_factor = exact;
-    if (exact <= 0.0 || squared <= 0.0 || dot(receiver.geometric, to_target) <= 0.0) return none;
-
-    vec3 reflectance = brdf_value(receiver.surface, receiver.to_eye, to_target / sqrt(squared));
-    vec3 lost = (exact - form_factor) * reflectance * (emitted + reflected);
-    vec3 size = abs(target);
-    // Ends before the leaf's own surface.
-    target += max(size.x, max(size.y, size.z)) * (1.0 / 524288.0) * sender_normal;
-    return Arrival(form_factor * reflectance * emitted, form_factor * reflectance * reflected, lost, target, slot);
+    if (dot(sender_normal, receiver.position - leaf.centre) <= slack) return none;
+    SenderPoint point;
+    if (!draw_point(leaf, receiver, sender_normal, u.xy, lobe_draw, options.jitter, point)) return none;
+    vec3 lost, light = reflected_light(leaf, receiver, sender_normal, options.clamp_radii, point, lost);
+    vec3 target = receiver.position + point.to + end_offset() * sender_normal;
+    return Arrival(light * emitted, light * reflected, lost * (emitted + reflected), target, slot);
 }
 #endif

@@ -14,10 +14,7 @@ struct LeafMaps {
 // Where a point of the leaf lies on it, -1/2..1/2 along either side.
 vec2 place_on_leaf(SenderLeaf leaf, vec3 point)
 {
-    vec3 across = cross(leaf.edge_u, leaf.edge_v), offset = point - leaf.centre;
-    float squared = dot(across, across);
-    if (squared <= 0.0) return vec2(0.0);
-    return clamp(vec2(dot(cross(offset, leaf.edge_v), across), dot(cross(leaf.edge_u, offset), across)) / squared, vec2(-0.5), vec2(0.5));
+    return clamp(sides_on_leaf(leaf, point), vec2(-0.5), vec2(0.5));
 }
 
 // Places of the maps that are asked, and what each answer counts; the weights add up to one.

@@ -73,6 +73,23 @@ vec3 leaf_point(SenderLeaf leaf, vec2 u)
     return leaf.centre + (u.x - 0.5) * leaf.edge_u + (u.y - 0.5) * leaf.edge_v;
 }
 
+// Where a point of the leaf's plane lies, in its sides from the centre.
+vec2 sides_on_leaf(SenderLeaf leaf, vec3 point)
+{
+    vec3 across = cross(leaf.edge_u, leaf.edge_v), offset = point - leaf.centre;
+    float squared = dot(across, across);
+    if (squared <= 0.0) return vec2(0.0);
+    return vec2(dot(cross(offset, leaf.edge_v), across), dot(cross(leaf.edge_u, offset), across)) / squared;
+}
+
+// Whether it lies on the leaf.
+bool is_on_leaf(SenderLeaf leaf, vec3 point)
+{
+    vec2 at = sides_on_leaf(leaf, point);
+    if (leaf.is_triangle != 0) return min(at.x, at.y) >= -1.0 / 3.0 && at.x + at.y <= 1.0 / 3.0;
+    return max(abs(at.x), abs(at.y)) <= 0.5;
+}
+
 // Corners counter-clockwise seen from the front; returns how many.
 uint leaf_corners(SenderLeaf leaf, out vec3 corners[4])
 {

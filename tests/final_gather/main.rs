@@ -5,6 +5,7 @@ mod bound;
 mod common;
 mod fixture;
 mod gather;
+mod gloss;
 mod methods;
 mod pack;
 mod tree;

@@ -1,11 +1,13 @@
 //! The final gather by maps, by maps with rays where they leave doubt, and by rays.
 
 use crate::common::TestContext;
+use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, Shown, builtin_scene};
 use glam::{UVec2, Vec3};
 use linklight::display::final_gather::{self, Visibility};
-use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps};
+use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps, TexelVisibility};
 use linklight::scene::environment::Environment;
+use linklight::scene::{LightKind, Material};
 
 /// Maps so coarse that they err much.
 fn prepared(context: &TestContext, name: &str, bounces: u32) -> (Fixture, SurfaceShadowMaps) {
@@ -63,4 +65,27 @@ fn the_furnace_is_even_through_maps() {
         // Emitted, and reflected once; reflected twice and three times.
         assert!((direct / 1.5 - 1.0).abs() < 0.02 && (indirect / 0.375 - 1.0).abs() < 0.02);
     }
+}
+
+/// A floor and a wall of two large triangles each, about the origin: nothing is in any way, and a ray that ends on a surface
+/// does not meet that surface, however small the coordinates are where it ends.
+#[test]
+fn nothing_shadows_itself_about_the_origin() {
+    let context = TestContext::new();
+    let material = Material { double_sided: false, ..lambert(Vec3::splat(0.7)) };
+    let floor = parallelogram(Vec3::new(-3.0, 0.0, 3.0), Vec3::X * 6.0, Vec3::NEG_Z * 6.0, 1, 0);
+    let wall = parallelogram(Vec3::new(-3.0, -1.0, -1.0), Vec3::X * 6.0, Vec3::Y * 4.0, 1, 0);
+    let lamp = (light(LightKind::Point, 20.0), Vec3::new(0.3, 4.0, 0.5), Vec3::NEG_Y);
+    let fixture = Fixture::new(&context, scene(vec![material], vec![floor, wall], &[lamp]), &Environment::default());
+    let settings = Settings { atlas_resolution: 64, visibility: TexelVisibility::Rays, ..Settings::default() };
+    let method = fixture.prepare(&context, settings);
+    fixture.solve(&context, &method, 0);
+    let show = |gather_visibility| {
+        let settings = final_gather::Settings { gather_visibility, gather_threshold: 0.0, ..Default::default() };
+        fixture.show(&context, &method, settings, UVec2::new(48, 30))
+    };
+    let [rays, none] = [Visibility::Rays, Visibility::None].map(show);
+    let shadowed = rays.indirect.iter().zip(&none.indirect).filter(|(rays, none)| rays != none).count();
+    println!("{shadowed} of {} pixels are shadowed by what they see; {}", rays.report.pixels, rays.report);
+    assert!(rays.report.mean_rays > 100.0 && shadowed == 0, "{shadowed}");
 }
