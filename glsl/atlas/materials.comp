@@ -3,6 +3,7 @@
 #include "lib/prelude.glsl"
 #include "lib/atlas.glsl"
 #include "lib/material.glsl"
+#include "lib/texture_region.glsl"
 
 // One thread per texel: means over its parts of what it reflects and emits.                      [Ritschel2008 4.1]
 // reads texels, parts, triangles, triangle_materials, attributes, materials, textures
@@ -21,19 +22,10 @@ layout(set = 0, binding = 9, scalar) writeonly buffer Gloss { TexelGloss gloss[]
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint texel_count; } params;
 
-// Side of the part in texture space, as a fraction of the texture's width.
-float region_uv;
-
 vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float pixels = region_uv * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
-    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(pixels, 1.0)));
-}
-
-float uv_area(vec2 a, vec2 b, vec2 c)
-{
-    vec2 ab = b - a, ac = c - a;
-    return 0.5 * abs(ab.x * ac.y - ab.y * ac.x);
+    ivec2 size = textureSize(textures[nonuniformEXT(slot.texture)], 0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, region_level(slot, size));
 }
 
 void main()
@@ -51,7 +43,7 @@ void main()
         float triangle_area = 0.5 * length(across);
         VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
         float share = triangle_area > 0.0 ? part.area / triangle_area : 0.0;
-        region_uv = sqrt(share * max(uv_area(p.uv0, q.uv0, r.uv0), uv_area(p.uv1, q.uv1, r.uv1)));
+        set_region(p, q, r, share);
 
         vec3 w = vec3(1.0 - part.barycentrics.x - part.barycentrics.y, part.barycentrics);
         VertexAttributes at = interpolated(p, q, r, w);

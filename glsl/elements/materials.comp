@@ -3,6 +3,7 @@
 #include "lib/prelude.glsl"
 #include "lib/element.glsl"
 #include "lib/material.glsl"
+#include "lib/texture_region.glsl"
 
 // One thread per element: albedo and emission averaged over the triangles around its vertex, each sampled at the
 // centre of the third of its area that belongs to the vertex, at the mip level of that size.
@@ -24,19 +25,10 @@ layout(set = 0, binding = 10, scalar) writeonly buffer Area { float area[]; };
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint element_count; } params;
 
-// Size of the sampled region in each UV set, as a fraction of the texture's width.
-vec2 region_uv;
-
 vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
-    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
-}
-
-float uv_extent(vec2 a, vec2 b, vec2 c)
-{
-    vec2 ab = b - a, ac = c - a;
-    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / 6.0);
+    ivec2 size = textureSize(textures[nonuniformEXT(slot.texture)], 0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, region_level(slot, size));
 }
 
 void main()
@@ -57,7 +49,7 @@ void main()
         vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
         VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
         VertexAttributes at = interpolated(p, q, r, w);
-        region_uv = vec2(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
+        set_region(p, q, r, 1.0 / 3.0);
 
         Material m = materials[triangle_materials[triangle]];
         albedo_sum += third * albedo_of(m, at);

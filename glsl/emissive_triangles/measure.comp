@@ -3,6 +3,7 @@
 #include "lib/prelude.glsl"
 #include "lib/emissive_triangle.glsl"
 #include "lib/material.glsl"
+#include "lib/texture_region.glsl"
 
 // One thread per emissive triangle: its area in the present pose and its mean emission, from a 4 x 4 pattern of places
 // read at the mip level of their distance. Never zero where the factor is not: every place stays within reach.
@@ -18,19 +19,10 @@ layout(set = 0, binding = 6, scalar) writeonly buffer Measures { EmissiveMeasure
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint emitter_count; } params;
 
-// Extent of a sixteenth of the triangle, as a fraction of the texture's width.
-float region_uv;
-
 vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = region_uv * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
-    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
-}
-
-float uv_extent(vec2 a, vec2 b, vec2 c)
-{
-    vec2 ab = b - a, ac = c - a;
-    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / 32.0);
+    ivec2 size = textureSize(textures[nonuniformEXT(slot.texture)], 0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, region_level(slot, size));
 }
 
 void main()
@@ -41,7 +33,7 @@ void main()
     uint triangle = emissive_triangles[emitter];
     uvec3 v = triangles[triangle];
     VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
-    region_uv = max(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
+    set_region(p, q, r, 1.0 / 16.0);
     Material m = materials[triangle_materials[triangle]];
 
     vec3 sum = vec3(0.0);

@@ -8,7 +8,7 @@ use super::instance::Instance;
 use super::loss::{LossHook, LossPoint, Markers};
 use super::pass_hashes::PassHash;
 use super::pipelines::Pipelines;
-use super::profiler::{ClockPair, PassRecord};
+use super::profiler::{self, ClockPair, PassRecord};
 use super::recorder::{CommandSlot, PASSES_PER_POOL, Recorder};
 use super::selection::{self, DeviceInfo};
 use super::staging::StagingPool;
@@ -183,7 +183,7 @@ impl Context {
         Recorder::new(self, name)
     }
 
-    /// Takes all pass records since the last call, in submission order.
+    /// Takes all pass records since the last call, in submission order; at most 2^18 are held until then.
     pub fn take_records(&self) -> Vec<PassRecord> {
         std::mem::take(&mut *lock(&self.records))
     }
@@ -279,7 +279,12 @@ impl Context {
     }
 
     pub(super) fn append_records(&self, records: Vec<PassRecord>) {
-        lock(&self.records).extend(records);
+        if !profiler::keep(&mut lock(&self.records), records) {
+            tracing::warn!(
+                "more than {} passes ran since their records were read: profiles leave out those after",
+                profiler::RECORDS_KEPT
+            );
+        }
     }
 
     /// A command slot with reset command pool and queries.

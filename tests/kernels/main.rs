@@ -17,3 +17,5 @@ mod materials;
 mod pair_queue;
 mod punctual_irradiance;
 mod texel_light;
+mod texel_materials;
+mod texel_parts;

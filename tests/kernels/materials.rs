@@ -92,7 +92,7 @@ fn hold_averages(what: &str, got: &Averages, expected: &Averages, tolerance: Tol
 }
 
 /// `count` vertices in two parts per material, triangles between any of a part's; the last vertex has none.
-fn jumble(count: usize, random: &mut Random) -> Scene {
+pub fn jumble(count: usize, random: &mut Random) -> Scene {
     let plain = lambert(Vec3::new(0.2, 0.5, 0.8));
     let materials = vec![
         Material { metallic: 0.25, emission: Vec3::new(1.0, 2.0, 3.0), ..plain.clone() },
@@ -142,7 +142,7 @@ fn materials_agree_with_their_twin() {
 }
 
 /// A quad of 2 x 2 cells whose texture coordinates run over the texture once.
-fn textured(image: Image) -> Scene {
+pub fn textured(image: Image) -> Scene {
     let texture = Some(TextureRef { texture: 0, uv_set: 0, transform: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] });
     let material = Material {
         base_color_texture: texture,
@@ -163,7 +163,7 @@ fn textured(image: Image) -> Scene {
     scene
 }
 
-fn image(side: u32, srgb: bool, texel: impl Fn(u32, u32) -> [u8; 3]) -> Image {
+pub fn image(side: u32, srgb: bool, texel: impl Fn(u32, u32) -> [u8; 3]) -> Image {
     let rgba = (0..side * side).flat_map(|i| {
         let [r, g, b] = texel(i % side, i / side);
         [r, g, b, 255]

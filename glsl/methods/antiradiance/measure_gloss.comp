@@ -4,6 +4,7 @@
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
 #include "lib/material.glsl"
+#include "lib/texture_region.glsl"
 
 // One thread per leaf: its specular lobe, averaged over the triangles around its vertices.
 // reads leaves[leaf_count], members, triangles, triangle_materials, incident_offsets[vertex_count + 1], incident_triangles, positions,
@@ -22,11 +23,10 @@ layout(set = 0, binding = 9, scalar) readonly buffer Members { uint members[]; }
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
 
-// A middling level: a cell sees many texels.
 vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = 0.02 * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
-    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
+    ivec2 size = textureSize(textures[nonuniformEXT(slot.texture)], 0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, region_level(slot, size));
 }
 
 void main()
@@ -44,7 +44,9 @@ void main()
             vec3 a = positions[v.x], b = positions[v.y], c = positions[v.z];
             float area = length(cross(b - a, c - a));
             vec3 w = (vec3(equal(v, uvec3(vertex))) * 15.0 + 7.0) / 36.0;
-            VertexAttributes at = interpolated(attributes[v.x], attributes[v.y], attributes[v.z], w);
+            VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
+            set_region(p, q, r, 1.0 / 3.0);
+            VertexAttributes at = interpolated(p, q, r, w);
             Surface s = surface_of(materials[triangle_materials[triangle]], at, vec3(0.0, 0.0, 1.0), vec4(1.0, 0.0, 0.0, 1.0), false);
             if (!s.reflects) continue;
             mean.f0 += area * s.f0;

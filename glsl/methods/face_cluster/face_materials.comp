@@ -2,6 +2,7 @@
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
 #include "lib/material.glsl"
+#include "lib/texture_region.glsl"
 
 // One thread per triangle: mean albedo, reflectance (specular included, seen along the normal) and emission, from four
 // places of it.
@@ -18,19 +19,10 @@ layout(set = 0, binding = 6, scalar) writeonly buffer Emission { vec3 emission[]
 layout(set = 1, binding = 0) uniform sampler2D textures[];
 layout(push_constant, scalar) uniform Params { uint triangle_count; } params;
 
-// Width of a quarter of the triangle in each UV set.
-vec2 region_uv;
-
 vec4 sample_texture(TextureSlot slot, vec2 uv)
 {
-    float texels = max(region_uv.x, region_uv.y) * float(textureSize(textures[nonuniformEXT(slot.texture)], 0).x);
-    return textureLod(textures[nonuniformEXT(slot.texture)], uv, log2(max(texels, 1.0)));
-}
-
-float uv_extent(vec2 a, vec2 b, vec2 c)
-{
-    vec2 ab = b - a, ac = c - a;
-    return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / 8.0);
+    ivec2 size = textureSize(textures[nonuniformEXT(slot.texture)], 0);
+    return textureLod(textures[nonuniformEXT(slot.texture)], uv, region_level(slot, size));
 }
 
 void main()
@@ -39,7 +31,7 @@ void main()
     if (t >= params.triangle_count) return;
     uvec3 v = triangles[t];
     VertexAttributes p = attributes[v.x], q = attributes[v.y], r = attributes[v.z];
-    region_uv = vec2(uv_extent(p.uv0, q.uv0, r.uv0), uv_extent(p.uv1, q.uv1, r.uv1));
+    set_region(p, q, r, 1.0 / 4.0);
     Material m = materials[triangle_materials[t]];
     // Centres of the four like triangles that the middles of its sides make of it.
     vec3 places[4] = vec3[4](vec3(4, 1, 1) / 6.0, vec3(1, 4, 1) / 6.0, vec3(1, 1, 4) / 6.0, vec3(2, 2, 2) / 6.0);

@@ -16,7 +16,7 @@ use crate::methods::METHODS;
 const SMALL: [(&str, &str); 4] = [
     (
         "surface-shadow-maps",
-        "--set atlas_resolution=24 --set map_resolution=8 --set keep_maps=false --set light_samples=2",
+        "--set atlas_resolution=40 --set map_resolution=8 --set keep_maps=false --set light_samples=2",
     ),
     ("explicit-visibility", "--set rays_per_element=64"),
     ("implicit-visibility", "--set bins=8"),
@@ -101,6 +101,13 @@ fn bytes(context: &Context) -> u64 {
     context.memory_by_owner().values().map(|used| used.current_bytes).sum()
 }
 
+/// Bytes of this process in memory, MiB, where the system tells.
+fn resident() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kibibytes = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?.trim().strip_suffix(" kB")?;
+    kibibytes.parse::<u64>().ok().map(|kibibytes| kibibytes / 1024)
+}
+
 #[test]
 fn random_edits_leave_pictures_and_memory_as_they_were() {
     let frames: u64 = variable("LINKLIGHT_SOAK_FRAMES").map_or(12, |text| text.parse().unwrap());
@@ -128,13 +135,15 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
     let first_state = state.clone();
     let first = pixels(&context, &mut engine, &asked(&state));
     let has_lights = !engine.stage().unwrap().pose.lights.is_empty();
-    let (mut levels, start) = (Vec::new(), Instant::now());
+    let (mut levels, mut host, start) = (Vec::new(), Vec::new(), Instant::now());
     let every = (frames / 4).max(1);
     for frame in 1..=frames {
         state.change(&mut random, has_lights);
         let options = asked(&state);
         let picture = pixels(&context, &mut engine, &options);
         assert!(picture.iter().all(|pixel| pixel.is_finite()), "{options}: not finite in frame {frame}");
+        // As the window does.
+        context.take_records();
         if frame % every == 0 {
             let fresh = pixels(&context, &mut Engine::new(&context), &options);
             assert!(picture == fresh, "{options}: frame {frame} of seed {seed} is not a new engine's");
@@ -143,11 +152,17 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
                 "{options}: frame {frame}, then back"
             );
             levels.push(bytes(&context));
+            host.extend(resident());
         }
     }
-    println!("{scene} {method}: {frames} frames in {:.0?}, bytes at rest {levels:?}", start.elapsed());
+    println!(
+        "{scene} {method}: {frames} frames in {:.0?}, bytes at rest {levels:?}, MiB of the process {host:?}",
+        start.elapsed()
+    );
     // By the second sample everything that is kept for further use was made.
     assert!(levels[1..].iter().all(|level| level == &levels[1]), "{scene} {method}: memory grows: {levels:?}");
+    // What the allocator keeps varies a little.
+    assert!(host.iter().all(|level| *level <= host[1] + 64), "{scene} {method}: the process grows: {host:?} MiB");
     // The layer says first what it switches on for itself.
     let is_setting = |m: &String| m.contains("layer settings provided") || m.contains("is adjusting settings");
     let said: Vec<String> = context.validation_messages().into_iter().filter(|m| !is_setting(m)).collect();
