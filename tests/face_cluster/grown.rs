@@ -9,7 +9,7 @@ use linklight::gpu::Buffer;
 use linklight::gpu::shaders::types::{FaceElement, PairCounters, PoolCounters};
 use linklight::methods::face_cluster::rules::Rule;
 use linklight::methods::face_cluster::{FaceClusters, Placement, Settings};
-use linklight::scene::{LightKind, Primitive};
+use linklight::scene::{Light, LightKind, Primitive};
 
 pub const RECEIVER: Rule = Rule::Seven;
 pub const SHOOTER: Rule = Rule::Six;
@@ -33,8 +33,8 @@ pub struct Grown {
     pub means: Vec<f32>,
 }
 
-/// A floor, a wavy sheet with two sides above it, a board between them, a closed post that stands in the floor, and two
-/// lamps.
+/// A floor, a wavy sheet with two sides above it, a board between them, a closed post that stands in the floor, and
+/// three lamps.
 pub fn grown(count: usize) -> Grown {
     grown_in(count, [0.2, 3.0], Some(closed_box(Vec3::new(-0.8, -0.1, -0.7), Vec3::new(-0.35, 0.3, 0.1), 4, 0)))
 }
@@ -57,6 +57,11 @@ fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) ->
     let lamps = [
         (light(LightKind::Point, 3.0), Vec3::new(0.2, 0.7, -0.1), Vec3::NEG_Y),
         (light(LightKind::Directional, 2.0), Vec3::ZERO, Vec3::new(0.3, -1.0, 0.2)),
+        (
+            Light { range: Some(1.5), ..light(LightKind::Spot { inner_angle: 0.3, outer_angle: 1.0 }, 4.0) },
+            Vec3::new(-0.5, 0.8, 0.3),
+            Vec3::new(0.4, -1.0, -0.2),
+        ),
     ];
     let fixture =
         Fixture::new(&context, scene(materials, [floor, sheet, board].into_iter().chain(post).collect(), &lamps), None);
@@ -134,10 +139,21 @@ impl Grown {
         self.context.download(buffer).unwrap()
     }
 
+    /// Those of the nodes, each as whole 127ths.
+    fn bytes_of_normals(&self) -> impl Iterator<Item = Vec<Vec3>> {
+        let bytes = |n: &Vec3| (n.clamp(Vec3::NEG_ONE, Vec3::ONE) * 127.0).round();
+        self.normals.iter().map(move |of_element| of_element.iter().map(bytes).collect())
+    }
+
     /// As kernels store them: a signed byte an axis.
     pub fn packed_normals(&self) -> Vec<u32> {
-        let byte = |v: f32| (v.clamp(-1.0, 1.0) * 127.0).round() as i32 as u32 & 0xff;
-        self.normals.iter().flatten().map(|n| byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16).collect()
+        let byte = |v: f32| v as i32 as u32 & 0xff;
+        self.bytes_of_normals().flatten().map(|n| byte(n.x) | byte(n.y) << 8 | byte(n.z) << 16).collect()
+    }
+
+    /// As kernels read them.
+    pub fn read_normals(&self) -> Vec<Vec<Vec3>> {
+        self.bytes_of_normals().map(|of_element| of_element.iter().map(|n| n / 127.0).collect()).collect()
     }
 
     pub fn pool(&self, element_count: usize, made_count: usize) -> Buffer<PoolCounters> {

@@ -206,8 +206,8 @@ fn children_are_claimed_once_and_pairs_expanded() {
     let leaves: Vec<usize> =
         g.leaves().into_iter().filter(|&e| g.tables.children(g.elements[e].cluster).is_some()).collect();
     let inner = (0..40).find(|&e| g.elements[e].children != NONE).unwrap();
-    // Two ask for the first leaf; what has children, or waits, or is done, claims nothing.
-    let pairs: Vec<UVec2> = [
+    // Two ask for the first leaf; what has children, or waits, or is done, claims nothing. The last is of no step.
+    let table: Vec<UVec2> = [
         (leaves[0], leaves[1]),
         (leaves[0], leaves[2]),
         (leaves[1], leaves[2]),
@@ -215,15 +215,16 @@ fn children_are_claimed_once_and_pairs_expanded() {
         (inner, leaves[4]),
         (leaves[4], leaves[5]),
         (leaves[5], leaves[4]),
+        (leaves[6], leaves[4]),
     ]
     .map(|(a, b)| UVec2::new(a as u32, b as u32))
     .to_vec();
-    let decisions = [1u32, 1, 2, 3, 1, 0, 4];
+    let (pairs, decisions) = (&table[..7], [1u32, 1, 2, 3, 1, 0, 4, 1]);
     for (capacity, room) in [(64usize, 3usize), (44, 2)] {
-        let mut table = g.elements.clone();
-        table.resize(64, bytemuck::Zeroable::zeroed());
-        let (elements, pool) = (g.table(&table), g.pool(40, 40));
-        let (taken, counters) = (g.table(&pairs), g.counters(pairs.len()));
+        let mut all = g.elements.clone();
+        all.resize(64, bytemuck::Zeroable::zeroed());
+        let (elements, pool) = (g.table(&all), g.pool(40, 40));
+        let (taken, counters) = (g.table(&table), g.counters(pairs.len()));
         let (decided, stack) = (g.table(&decisions), g.table(&[UVec2::ZERO; 64]));
         let mut recorder = g.context.recorder("test").unwrap();
         recorder.dispatch(
@@ -254,6 +255,7 @@ fn children_are_claimed_once_and_pairs_expanded() {
         let wanting = [leaves[0], leaves[2], leaves[3]];
         let granted: Vec<usize> = wanting.into_iter().filter(|&e| found[e].children != NONE).collect();
         assert_eq!(granted.len(), room);
+        assert_eq!(found[leaves[6]].children, NONE, "a pair of no step claims nothing");
         let mut places: Vec<u32> = granted.iter().map(|&e| found[e].children).collect();
         places.sort_unstable();
         assert_eq!(places, (0..room as u32).map(|k| 40 + 2 * k).collect::<Vec<_>>(), "side by side, from the end");

@@ -277,6 +277,12 @@ fn shares_of(asked: &[(usize, f64)], count: usize, is_small: bool) -> Vec<f64> {
     (0..count).map(of).collect()
 }
 
+/// Whether single precision may see a way on the other side of a face: along one axis it is exact.
+fn is_level(normal: DVec3, way: DVec3) -> bool {
+    let axes = normal.to_array().iter().filter(|v| **v != 0.0).count();
+    axes > 1 && way.dot(normal).abs() < 1e-5 * way.length()
+}
+
 /// `transport`: a shooter's light to a receiver, or which of them is to be split.               [Gobbetti2003 3.3]
 pub fn transport(
     t: &Tables,
@@ -380,11 +386,9 @@ pub fn transport(
         _ => SPLIT_SHOOTER,
     };
     let mut outcome = reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, split);
-    // Level with a face single precision, and normals of a byte an axis, may take another node for a ray.
-    let is_level = |(x, n): (DVec3, DVec3), y: DVec3| (y - x).dot(n).abs() < 0.02 * (y - x).length();
     let is_unclear = |r: usize, s: usize| {
         let (x, y) = (at(receiver, r), at(shooter, receivers + s));
-        is_level(x, y.0) || is_level(y, x.0)
+        is_level(x.1, y.0 - x.0) || is_level(y.1, x.0 - y.0)
     };
     if (0..receivers).any(|r| (0..shooters).any(|s| is_unclear(r, s))) {
         outcome.quotients.push(1.0);
@@ -392,7 +396,15 @@ pub fn transport(
     outcome
 }
 
-/// `transport_lights`: a directional light's or a point light's.
+/// Shares of its intensity that a lamp sends along `way` (metres, to the lamp): within its range, and its cone.
+fn falloff(light: &Light, way: DVec3) -> f64 {
+    let ratio = if light.range > 0.0 { way.length() / f64::from(light.range) } else { 0.0 };
+    let cosine = -light.direction.as_dvec3().dot(way.normalize());
+    let in_cone = (cosine * f64::from(light.spot_scale) + f64::from(light.spot_offset)).clamp(0.0, 1.0).powi(2);
+    (1.0 - ratio.powi(4)).clamp(0.0, 1.0) * if light.kind == 1 { in_cone } else { 1.0 }
+}
+
+/// `transport_lights`.
 pub fn transport_light(
     t: &Tables,
     a: &FaceElement,
@@ -406,7 +418,7 @@ pub fn transport_light(
         if light.kind == 2 {
             (-light.direction.as_dvec3(), light.intensity.as_dvec3(), far)
         } else {
-            (to.normalize(), light.intensity.as_dvec3() / to.length_squared(), to.length())
+            (to.normalize(), light.intensity.as_dvec3() * falloff(light, to) / to.length_squared(), to.length())
         }
     };
     let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
@@ -446,7 +458,7 @@ pub fn transport_light(
     };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
     let mut outcome = reaching.decided((t, nodes), (a, None), way, free, split);
-    if (0..receivers).any(|r| of(r).0.dot(normals[r].as_dvec3()).abs() < 0.02) {
+    if (0..receivers).any(|r| is_level(normals[r].as_dvec3(), of(r).0)) {
         outcome.quotients.push(1.0);
     }
     outcome

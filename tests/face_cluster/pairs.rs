@@ -20,7 +20,7 @@ fn compare_outcomes(
     run: impl Fn(&Buffer<UVec2>, &Buffer<i32>, &Buffer<u32>, &Buffer<PoolCounters>),
 ) {
     let clear: Vec<usize> = (0..pairs.len()).filter(|&i| outcomes[i].is_clear()).collect();
-    assert!(clear.len() * 100 > 50 * pairs.len(), "{} of {} are clear", clear.len(), pairs.len());
+    assert!(clear.len() * 100 > 95 * pairs.len(), "{} of {} are clear", clear.len(), pairs.len());
     let taken: Vec<UVec2> = clear.iter().map(|&i| pairs[i]).collect();
     let arriving = g.table(&vec![0i32; g.elements.len() * FUNCTIONS * 9]);
     let decisions = g.table(&vec![99u32; taken.len()]);
@@ -59,6 +59,7 @@ fn pairs_are_transported_or_split() {
     let flat_unshot: Vec<Vec3> = unshot.iter().flatten().copied().collect();
     let flat_nodes: Vec<Vec3> = g.nodes.iter().flatten().copied().collect();
     let (p, world, units) = (g.method.placement(), &g.fixture.world, 1e7f32);
+    let normals = g.read_normals();
     for (by, rays_per_node, threshold, step) in
         [(Blockers::Triangles, 1, 2e-3, 1), (Blockers::Triangles, 3, 2e-2, 3), (Blockers::Clusters, 1, 5e-3, 3)]
     {
@@ -66,7 +67,7 @@ fn pairs_are_transported_or_split() {
         let pairs: Vec<UVec2> = pairs.iter().step_by(step).copied().collect();
         let of = |pair: &UVec2| {
             let pair = [pair.x as usize, pair.y as usize];
-            pair_twins::transport(&g.tables, &g.elements, (&g.nodes, &g.normals), &unshot, pair, &way)
+            pair_twins::transport(&g.tables, &g.elements, (&g.nodes, &normals), &unshot, pair, &way)
         };
         let outcomes: Vec<Outcome> = pairs.iter().map(of).collect();
         compare_outcomes(&g, &pairs, &outcomes, units, |taken, arriving, decisions, pool| {
@@ -121,9 +122,10 @@ fn pairs_are_transported_or_split() {
 fn light_of_lamps_is_transported_or_split() {
     let g = grown_over(120, [0.5, 5.0]);
     let (p, world, units) = (g.method.placement(), &g.fixture.world, 1e7f32);
+    let normals = g.read_normals();
     let lights = g.read(&world.lights);
     let pairs: Vec<UVec2> =
-        (0..g.elements.len() as u32).flat_map(|e| [0, 1].map(|l| UVec2::new(e, l | 1 << 31))).collect();
+        (0..g.elements.len() as u32).flat_map(|e| [0, 1, 2].map(|l| UVec2::new(e, l | 1 << 31))).collect();
     let flat_nodes: Vec<Vec3> = g.nodes.iter().flatten().copied().collect();
     let (threshold, far, ray_offset) = (0.05, 10.0f32, 1e-4f32);
     let way =
@@ -131,7 +133,7 @@ fn light_of_lamps_is_transported_or_split() {
     let of = |pair: &UVec2| {
         let (e, l) = (pair.x as usize, (pair.y & !(1 << 31)) as usize);
         let reach = [f64::from(far), f64::from(ray_offset)];
-        pair_twins::transport_light(&g.tables, &g.elements[e], (&g.nodes[e], &g.normals[e]), &lights[l], &way, reach)
+        pair_twins::transport_light(&g.tables, &g.elements[e], (&g.nodes[e], &normals[e]), &lights[l], &way, reach)
     };
     let outcomes: Vec<Outcome> = pairs.iter().map(of).collect();
     compare_outcomes(&g, &pairs, &outcomes, units, |taken, arriving, decisions, pool| {
