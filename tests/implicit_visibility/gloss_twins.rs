@@ -32,24 +32,25 @@ pub fn color(random: &mut Random) -> Vec3 {
 }
 
 /// Leaves of one window that starts at `first_leaf`, half of them glossy, and two nodes above.
-struct Case {
-    first_leaf: u32,
+#[derive(Clone)]
+pub struct Case {
+    pub first_leaf: u32,
     /// All leaves, those before the window too.
-    receivers: Vec<Receiver>,
+    pub receivers: Vec<Receiver>,
     /// Of the window, bin after bin.
-    winners: Vec<u32>,
-    node_radiosity: Vec<Vec3>,
-    glossy_of_node: Vec<u32>,
-    glossy_leaves: Vec<u32>,
-    specular: Vec<Vec3>,
-    leaf_elements: Vec<u32>,
-    element_vertices: Vec<u32>,
-    lobes: Vec<LeafGloss>,
-    bin_radiance: Vec<Vec3>,
+    pub winners: Vec<u32>,
+    pub node_radiosity: Vec<Vec3>,
+    pub glossy_of_node: Vec<u32>,
+    pub glossy_leaves: Vec<u32>,
+    pub specular: Vec<Vec3>,
+    pub leaf_elements: Vec<u32>,
+    pub element_vertices: Vec<u32>,
+    pub lobes: Vec<LeafGloss>,
+    pub bin_radiance: Vec<Vec3>,
 }
 
 impl Case {
-    fn new(leaf_count: u32, first_leaf: u32, random: &mut Random) -> Self {
+    pub fn new(leaf_count: u32, first_leaf: u32, random: &mut Random) -> Self {
         let (all, nodes) = (leaf_count + first_leaf, leaf_count + first_leaf + 2);
         let bins = 6 * N * N;
         let receivers = (0..all).map(|leaf| Receiver {
@@ -94,7 +95,7 @@ impl Case {
         }
     }
 
-    fn leaf_count(&self) -> u32 {
+    pub fn leaf_count(&self) -> u32 {
         self.receivers.len() as u32 - self.first_leaf
     }
 
