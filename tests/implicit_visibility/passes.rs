@@ -104,16 +104,13 @@ fn backs_and_kept_links_are_counted() {
     assert!(inside > 0, "no element stands inside the figure's pedestal");
 }
 
-/// What the four winners around a point's direction are to it.
+/// Why a point is not seen past the winners around its direction.
 #[derive(Default)]
 struct Hidden {
-    /// All have it behind their planes.
-    by_all: bool,
     /// One of them is in its way.
-    by_one: bool,
-    /// Weight of those whose planes are in its way where the next bins are and their surfaces go on, by their nearness to
-    /// its direction.
-    by_most: f32,
+    by_winner: bool,
+    /// What lies beside one of them is, of the same sixteen nodes.
+    by_neighbour: bool,
 }
 
 /// The bins as a shadow map: twin of `see_emitters`.
@@ -124,30 +121,34 @@ fn hidden_by(row: &[u32], trees: (&QuadtreeTopology, &[Surfel]), at: &Receiver, 
     let across = [direction[(axis + 1) % 3], direction[(axis + 2) % 3]].map(|c| c / direction[axis].abs());
     let face = 2 * axis as u32 + u32::from(direction[axis] < 0.0);
     let place = across.map(|c| (0.5 * c + 0.5) * n as f32 - 0.5);
-    let mut hidden = Hidden { by_all: true, ..Hidden::default() };
+    // Whether the plane of a surfel passes between, and where its ellipse is.
+    let crossing = |node: u32| {
+        let s = &surfels[node as usize];
+        let side = |x: Vec3| s.normal.dot(x - s.centre);
+        let slack = s.thickness + 0.02 * s.extent;
+        let is_between = if side(at.origin) > 0.0 { side(point) < -slack } else { side(point) > slack };
+        let met = at.origin.lerp(point, side(at.origin) / (side(at.origin) - side(point)));
+        let is_within = s.g1.dot(met - s.centre).powi(2) + s.g2.dot(met - s.centre).powi(2) <= 1.0;
+        (is_between, is_between && is_within)
+    };
+    let mut hidden = Hidden::default();
     for corner in 0..4u32 {
         let steps = [(corner & 1) as f32, (corner >> 1) as f32];
         let uv = [0, 1].map(|k| (2.0 * (place[k].floor() + steps[k]) + 1.0) / n as f32 - 1.0);
-        let weight = [0, 1].map(|k| 1.0 - (place[k] - place[k].floor() - steps[k]).abs());
         let towards = bins::face_direction(face, uv[0].into(), uv[1].into()).as_vec3();
         let winner = row[bins::bin_of(towards, n) as usize];
         if winner == twins::EMPTY {
-            hidden.by_all = false;
             continue;
         }
         let node = winner & !twins::BACK;
-        let s = &surfels[node as usize];
-        let surface = (0..3).fold(node, |node, _| topology.parent(node).unwrap_or(node));
-        let is_within = |s: &Surfel, x: Vec3| s.g1.dot(x - s.centre).powi(2) + s.g2.dot(x - s.centre).powi(2) <= 1.0;
-        let side = |x: Vec3| s.normal.dot(x - s.centre);
-        let slack = s.thickness + 0.02 * s.extent;
-        let is_behind = if side(at.origin) > 0.0 { side(point) < -slack } else { side(point) > slack };
-        let met = at.origin.lerp(point, side(at.origin) / (side(at.origin) - side(point)));
-        let is_near = met.distance(s.centre) <= s.extent + 2.0 / n as f32 * met.distance(at.origin);
-        let is_beside = is_near && is_within(&surfels[surface as usize], met);
-        hidden.by_all &= is_behind;
-        hidden.by_one |= is_behind && is_within(s, met);
-        hidden.by_most += if is_behind && is_beside { weight[0] * weight[1] } else { 0.0 };
+        let (is_between, is_within) = crossing(node);
+        hidden.by_winner |= is_within;
+        if is_between {
+            let level = topology.segment(node);
+            let first = level.first + (node - level.first) / 16 * 16;
+            let beside = first..(first + 16).min(level.first + level.count);
+            hidden.by_neighbour |= beside.filter(|&other| other != node).any(|other| crossing(other).1);
+        }
     }
     hidden
 }
@@ -169,17 +170,17 @@ fn emitters_are_seen_past_the_winners() {
         (a + s.barycentrics.x * (b - a) + s.barycentrics.y * (c - a), normal)
     };
     let words = samples.len().div_ceil(32);
-    let (mut seen, mut hidden, mut differing, mut alone) = (0, 0, 0, [0; 3]);
+    let (mut seen, mut hidden, mut differing, mut alone) = (0, 0, 0, [0; 2]);
     for (leaf, row) in winners(&context, &method).iter().enumerate() {
         let (at, element) = (&receivers[leaf], method.trees().topology.leaf_elements[leaf] as usize);
         for (k, sample) in samples.iter().enumerate() {
             let (point, normal) = place(sample);
             let faces = sample.is_double_sided != 0 || normal.dot(at.origin - point) > 0.0;
-            let Hidden { by_all, by_one, by_most } =
+            let Hidden { by_winner, by_neighbour } =
                 hidden_by(row, (&method.trees().topology, &surfels), at, point, settings.bins);
             let is_above = (point - at.origin).dot(at.normal) > 0.0;
-            let reasons = [by_all, by_one, by_most > 0.5];
-            let expected = faces && is_above && reasons == [false; 3];
+            let reasons = [by_winner, by_neighbour];
+            let expected = faces && is_above && reasons == [false; 2];
             if faces && is_above && reasons.iter().filter(|&&reason| reason).count() == 1 {
                 alone.iter_mut().zip(reasons).for_each(|(count, reason)| *count += usize::from(reason));
             }

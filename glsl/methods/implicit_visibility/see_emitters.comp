@@ -5,8 +5,8 @@
 #include "lib/quadtree.glsl"
 
 // One thread per leaf of a window and word of samples: which points on emitters it sees. The bins are an omnidirectional
-// shadow map: a point is hidden where it lies behind the winners around its direction.             [Dong2007 3]
-// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels, ancestors [node_count],
+// shadow map whose pixels say which surface is there: that surface, not the pixel, hides the point.            [Dong2007 3]
+// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels, node_segments [node_count], segments,
 // samples[sample_count], triangles, positions   writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
 // Differs from [Dong2007]: every point is tested, so that an emitter smaller than a bin keeps its size and its shadow.
 layout(local_size_x = 64) in;
@@ -18,7 +18,8 @@ layout(set = 0, binding = 4, scalar) readonly buffer Samples { EmitterSample sam
 layout(set = 0, binding = 5, scalar) readonly buffer Triangles { uvec3 triangles[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer Visible { uint visible[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer Ancestors { uint ancestors[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer NodeSegments { uint node_segments[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer Segments { QuadtreeSegment segments[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_leaf;
     uint leaf_count;    // of the window
@@ -26,56 +27,57 @@ layout(push_constant, scalar) uniform Params {
     uint sample_count;
 } params;
 
-// How a winner stands to a point that is looked at.
-struct Shade {
-    bool by_plane;      // its plane passes between the receiver and the point
-    bool is_beside;     // and where it does is no farther off the winner than the next bins are, and on the same surface
-    bool by_itself;     // or is the winner itself
+// Neighbours of a winner that tell whether its surface goes on: what lies below the node two levels up.
+const uint NEIGHBOURS = 16;
+
+// Where a surfel's plane passes between the receiver and the point.
+struct Crossing {
+    bool is_between;
+    bool is_within;     // in its ellipse
 };
 
-bool is_within(Surfel s, vec3 place)
+Crossing crossing_of(Surfel s, vec3 origin, vec3 point)
 {
-    float x = dot(s.g1, place - s.centre), y = dot(s.g2, place - s.centre);
-    return x * x + y * y <= 1.0;
-}
-
-Shade shade_of(uint winner, vec3 origin, vec3 point)
-{
-    if (winner == EMPTY_BIN) return Shade(false, false, false);
-    uint node = winner & NODE_MASK;
-    Surfel s = surfels[node];
     float of_origin = dot(s.normal, origin - s.centre), of_point = dot(s.normal, point - s.centre);
     float slack = s.thickness + 0.02 * s.extent;
-    if (!(of_origin > 0.0 ? of_point < -slack : of_point > slack)) return Shade(false, false, false);
-    vec3 met = mix(origin, point, of_origin / (of_origin - of_point));
-    vec3 there = met - s.centre;
-    float reach = s.extent + 2.0 / float(params.n) * length(met - origin);
-    bool is_beside = dot(there, there) <= reach * reach && is_within(surfels[ancestors[node]], met);
-    return Shade(true, is_beside, is_within(s, met));
+    bool is_between = of_origin > 0.0 ? of_point < -slack : of_point > slack;
+    vec3 there = mix(origin, point, of_origin / (of_origin - of_point)) - s.centre;
+    float x = dot(s.g1, there), y = dot(s.g2, there);
+    return Crossing(is_between, is_between && x * x + y * y <= 1.0);
 }
 
-// A point is hidden by a winner of one of the four bins around its direction, or by the surface that lies before it in
-// all four. Where only some have it before the point, its edge passes between them: halfway, as far as the bins can tell,
-// so that those decide that are nearer to its direction.
+// Whether the surface of a winner passes between: itself, or where it goes on.
+bool hides(uint winner, vec3 origin, vec3 point)
+{
+    if (winner == EMPTY_BIN) return false;
+    uint node = winner & NODE_MASK;
+    Crossing own = crossing_of(surfels[node], origin, point);
+    if (!own.is_between || own.is_within) return own.is_within;
+    QuadtreeSegment level = segments[node_segments[node]];
+    uint first = level.first + (node - level.first) / NEIGHBOURS * NEIGHBOURS;
+    uint last = min(first + NEIGHBOURS, level.first + level.count);
+    for (uint k = first; k < last; ++k) {
+        if (crossing_of(surfels[k], origin, point).is_within) return true;
+    }
+    return false;
+}
+
+// A point is hidden where the surface of a winner of one of the four bins around its direction passes before it.
 bool is_visible(uint local, Receiver at, vec3 point)
 {
     vec3 direction = turn_back(at.frame, point - at.origin);
     uint face = face_of(direction);
     vec3 in_axes = in_face(face, direction);
-    vec2 place = (0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5, low = floor(place), share = place - low;
-    bool by_all = true, by_one = false;
-    float hidden = 0.0;
+    vec2 low = floor((0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5);
+    uint last_winner = EMPTY_BIN;
     for (uint corner = 0; corner < 4; ++corner) {
         // Beyond the face's rim the direction leads to a neighbouring face.
-        vec2 side = vec2(corner & 1, corner >> 1), uv = (2.0 * (low + side) + 1.0) / float(params.n) - 1.0;
-        uint bin = bin_of(face_direction(face, uv), params.n);
-        Shade shade = shade_of(winners[bin * params.leaf_count + local], at.origin, point);
-        vec2 weights = mix(1.0 - share, share, side);
-        by_all = by_all && shade.by_plane;
-        by_one = by_one || shade.by_itself;
-        hidden += shade.is_beside ? weights.x * weights.y : 0.0;
+        vec2 uv = (2.0 * (low + vec2(corner & 1, corner >> 1)) + 1.0) / float(params.n) - 1.0;
+        uint winner = winners[bin_of(face_direction(face, uv), params.n) * params.leaf_count + local];
+        if (winner != last_winner && hides(winner, at.origin, point)) return false;
+        last_winner = winner;
     }
-    return !by_all && !by_one && hidden <= 0.5;
+    return true;
 }
 
 void main()

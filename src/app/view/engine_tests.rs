@@ -158,7 +158,7 @@ fn frames_with_everything_moving_allocate_nothing() {
     // Links of all elements in every frame take their time.
     for (method, frames, warm_up) in [
         ("path-tracing", frames, 3),
-        ("implicit-visibility --set bins=4", frames.div_ceil(8), 3),
+        ("implicit-visibility --set bins=2", frames.div_ceil(10), 3),
         // Two sets of links, each made in two frames, and then with room for more than before.
         (
             "explicit-visibility --set rays_per_element=16 --set link_budget=60000",

@@ -25,8 +25,6 @@ pub struct Quadtrees {
     pub surfels: Buffer<Surfel>,
     /// One per node.
     pub moments: Buffer<SurfelMoments>,
-    /// Per node: the one [`ANCESTOR_LEVELS`] further up, or the root.
-    pub ancestors: Buffer<u32>,
     /// One per leaf.
     pub leaf_cells: Buffer<LeafCell>,
     /// `CORNER_TEXELS` per entry of the elements' incident triangles.
@@ -36,9 +34,6 @@ pub struct Quadtrees {
     /// The same with what a walk looks at, `WALK_TEXELS` per node.
     pub walk_texels: TexelBuffer,
 }
-
-/// From a node to what tells where its surface ends: eight times as wide.
-pub const ANCESTOR_LEVELS: u32 = 3;
 
 /// Texels of a step of the walk and of a corner of a leaf's cell; the layouts are those of `lib/quadtree.glsl`.
 const WALK_TEXELS: usize = 3;
@@ -55,7 +50,6 @@ impl Quadtrees {
             segments: context.upload("quadtree/segments", &topology.segments)?,
             surfels: context.buffer("quadtree/surfels", count)?,
             moments: context.buffer("quadtree/moments", count)?,
-            ancestors: context.upload("quadtree/ancestors", &topology.ancestors(ANCESTOR_LEVELS))?,
             leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
             corner_texels: context.texel_buffer("quadtree/corner texels", (CORNER_TEXELS * corner_count).max(1))?,
             walk: context.upload("quadtree/walk", &topology.walk())?,

@@ -95,12 +95,6 @@ impl QuadtreeTopology {
         self.levels.last().map_or(0, |level| level.end)
     }
 
-    /// Of each node the one `levels` further up, or the root.
-    pub fn ancestors(&self, levels: u32) -> Vec<u32> {
-        let up = |node| (0..levels).fold(node, |node, _| self.parent(node).unwrap_or(node));
-        (0..self.node_count()).map(up).collect()
-    }
-
     pub fn parent(&self, node: u32) -> Option<u32> {
         let segment = self.segment(node);
         (segment.parent_first != NO_PARENT).then(|| segment.parent_first + (node - segment.first) / 4)
