@@ -46,36 +46,32 @@ Crossing crossing_of(Surfel s, vec3 origin, vec3 point)
     return Crossing(is_between, is_between && x * x + y * y <= 1.0);
 }
 
-// Whether the surface of a winner passes between: itself, or where it goes on.
-bool hides(uint winner, vec3 origin, vec3 point)
-{
-    if (winner == EMPTY_BIN) return false;
-    uint node = winner & NODE_MASK;
-    Crossing own = crossing_of(surfels[node], origin, point);
-    if (!own.is_between || own.is_within) return own.is_within;
-    QuadtreeSegment level = segments[node_segments[node]];
-    uint first = level.first + (node - level.first) / NEIGHBOURS * NEIGHBOURS;
-    uint last = min(first + NEIGHBOURS, level.first + level.count);
-    for (uint k = first; k < last; ++k) {
-        if (crossing_of(surfels[k], origin, point).is_within) return true;
-    }
-    return false;
-}
-
-// A point is hidden where the surface of a winner of one of the four bins around its direction passes before it.
+// A point is hidden where the surface of a winner of one of the four bins around its direction passes before it: the winner
+// itself, or where the surface goes on.
 bool is_visible(uint local, Receiver at, vec3 point)
 {
     vec3 direction = turn_back(at.frame, point - at.origin);
     uint face = face_of(direction);
     vec3 in_axes = in_face(face, direction);
     vec2 low = floor((0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5);
-    uint last_winner = EMPTY_BIN;
+    uint looked_at = EMPTY_BIN;     // neighbours that do not hide it
     for (uint corner = 0; corner < 4; ++corner) {
         // Beyond the face's rim the direction leads to a neighbouring face.
         vec2 uv = (2.0 * (low + vec2(corner & 1, corner >> 1)) + 1.0) / float(params.n) - 1.0;
         uint winner = winners[bin_of(face_direction(face, uv), params.n) * params.leaf_count + local];
-        if (winner != last_winner && hides(winner, at.origin, point)) return false;
-        last_winner = winner;
+        if (winner == EMPTY_BIN) continue;
+        uint node = winner & NODE_MASK;
+        QuadtreeSegment level = segments[node_segments[node]];
+        uint first = level.first + (node - level.first) / NEIGHBOURS * NEIGHBOURS;
+        if (first == looked_at) continue;
+        Crossing own = crossing_of(surfels[node], at.origin, point);
+        if (own.is_within) return false;
+        if (!own.is_between) continue;
+        uint last = min(first + NEIGHBOURS, level.first + level.count);
+        for (uint k = first; k < last; ++k) {
+            if (crossing_of(surfels[k], at.origin, point).is_within) return false;
+        }
+        looked_at = first;
     }
     return true;
 }
