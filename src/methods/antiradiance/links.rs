@@ -126,23 +126,23 @@ impl NodeLinks {
         }
         let sides = scales.len();
         let at_leaves = context.buffer::<u32>("antiradiance/even light at leaves", sides)?;
-        let by_links = context.buffer::<u32>("antiradiance/even light by links", sides)?;
+        let excess = context.buffer::<u32>("antiradiance/excess of even light", sides)?;
         recorder.fill(&at_leaves, 0);
-        recorder.fill(&by_links, 0);
+        recorder.fill(&excess, 0);
         for (links, link_count) in self.parts() {
             let pass = passes::EvenLight {
                 links,
                 nodes: &hierarchy.nodes,
                 leaves: &hierarchy.leaves,
                 at_leaves: &at_leaves,
-                by_links: &by_links,
+                excess: &excess,
                 params: passes::EvenLightParams { link_count },
             };
-            recorder.dispatch(&pass, 2 * link_count);
+            recorder.dispatch(&pass, link_count);
         }
         let pass = passes::EvenScales {
             at_leaves: &at_leaves,
-            by_links: &by_links,
+            excess: &excess,
             scales,
             params: passes::EvenScalesParams { side_count: sides as u32 },
         };
