@@ -96,8 +96,13 @@ fn making(
 ) -> SurfaceMaps {
     let resolution = settings.map_resolution;
     let input = MapInput { atlas: &method.atlas, tracer: *tracer, apart: None, bounds, content: &[], cache: None };
-    let options =
-        MapOptions { resolution, sequence: settings.sequence, bias: settings.map_bias, until: settings.map_until };
+    let options = MapOptions {
+        resolution,
+        sequence: settings.sequence,
+        bias: settings.map_bias,
+        until: settings.map_until,
+        sharing: settings.map_sharing,
+    };
     let start = Instant::now();
     let made = SurfaceMaps::new(context, input, options, &Unwatched).unwrap();
     let spent = start.elapsed().as_secs_f64();

@@ -33,8 +33,9 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     SenderLeaf shape = sender_shape(leaf);
     uint place = leaf_maps[leaf].place;
     if (CHECKED) {
-        vec3 d = target - origin;
-        float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
+        // A map that texels share may stand beside this one.
+        vec3 d = target - origin, beside = target - map_origins[place];
+        float radius_squared = max(dot(beside, beside), max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v)));
         bool is_seen, is_far = dot(d, d) >= params.map_reach * params.map_reach * radius_squared;
         bool is_sure = surface_map_is_sure(map_frame[0], place, map_origins[place], origin, receiver.geometric, is_seen);
         free = is_seen ? 1.0 : 0.0;

@@ -42,8 +42,9 @@ bool is_told(vec3 origin, vec3 target, uint leaf, out float free)
     bool is_back = dot(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]), receiver.geometric) < 0.0;
     uint texel = rigid_texel(triangle, vec3(1.0 - b.x - b.y, b), is_back);
     SenderLeaf shape = sender_shape(leaf);
-    vec3 d = target - origin;
-    float radius_squared = max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v));
+    // A map that texels share may stand beside this one.
+    vec3 d = target - origin, beside = at_rest(rigid_object(sender_object), target) - map_origins[leaf_maps[leaf].place];
+    float radius_squared = max(dot(beside, beside), max(dot(shape.edge_u, shape.edge_u), dot(shape.edge_v, shape.edge_v)));
     bool is_near = CHECKED && dot(d, d) < params.map_reach * params.map_reach * radius_squared;
     free = 0.0;
     if (texel == NO_SENDER || rigid_asks_rays(object, sender_object) || is_near) return false;

@@ -9,10 +9,11 @@ use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps, Texel
 use linklight::scene::environment::Environment;
 use linklight::scene::{LightKind, Material};
 
-/// Maps so coarse that they err much.
-fn prepared(context: &TestContext, name: &str, bounces: u32) -> (Fixture, SurfaceShadowMaps) {
+/// Maps so coarse that they err much, one for texels up to `map_sharing` texels apart.
+fn prepared(context: &TestContext, name: &str, bounces: u32, map_sharing: f32) -> (Fixture, SurfaceShadowMaps) {
     let fixture = Fixture::new(context, builtin_scene(name), &Environment::default());
-    let settings = Settings { atlas_resolution: 32, map_resolution: 16, keep_maps: false, ..Settings::default() };
+    let (atlas_resolution, map_resolution) = (32, 16);
+    let settings = Settings { atlas_resolution, map_resolution, map_sharing, keep_maps: false, ..Settings::default() };
     let method = fixture.prepare(context, settings);
     fixture.solve(context, &method, bounces);
     (fixture, method)
@@ -31,7 +32,7 @@ fn show(
 #[test]
 fn rays_where_maps_leave_doubt_mend_most_of_their_error() {
     let context = TestContext::new();
-    let prepared = prepared(&context, "cornell-box", 1);
+    let prepared = prepared(&context, "cornell-box", 1, 0.0);
     let rays = show(&context, &prepared, Visibility::Rays, 4.0);
     let maps = show(&context, &prepared, Visibility::Maps, 4.0);
     let checked = show(&context, &prepared, Visibility::Checked, 4.0);
@@ -52,11 +53,26 @@ fn rays_where_maps_leave_doubt_mend_most_of_their_error() {
     assert!(show(&context, &prepared, Visibility::Checked, 4.0).indirect == checked.indirect, "the same to the bit");
 }
 
+/// Half of the maps do with twice the error, and what is checked doubts them as far as they stand from what they see for.
+#[test]
+fn texels_that_share_maps_see_nearly_as_well() {
+    let context = TestContext::new();
+    let [own, shared] = [0.0, 1.2].map(|sharing| prepared(&context, "cornell-box", 1, sharing));
+    let [own_maps, shared_maps] = [&own, &shared].map(|prepared| prepared.1.report().maps);
+    let [rays, maps, checked] =
+        [Visibility::Rays, Visibility::Maps, Visibility::Checked].map(|by| show(&context, &shared, by, 4.0));
+    let unshared = show(&context, &own, Visibility::Maps, 4.0).off(&show(&context, &own, Visibility::Rays, 4.0));
+    let [off, checked_off] = [&maps, &checked].map(|shown| shown.off(&rays));
+    println!("{own_maps} maps are off by {unshared:.4}, {shared_maps} by {off:.4}, checked by {checked_off:.4}");
+    assert!(shared_maps * 4 < own_maps * 3, "{shared_maps} of {own_maps}");
+    assert!(off < 3.0 * unshared && off != unshared && checked_off < 0.6 * off);
+}
+
 /// A closed room of albedo 1/2 that emits 1 everywhere, seen through maps: pi / 2^k again and again.     [common ground]
 #[test]
 fn the_furnace_is_even_through_maps() {
     let context = TestContext::new();
-    let prepared = prepared(&context, "furnace", 1);
+    let prepared = prepared(&context, "furnace", 1, 0.0);
     for visibility in [Visibility::Maps, Visibility::Checked] {
         let shown = show(&context, &prepared, visibility, 4.0);
         let mean = |values: &[Vec3]| values.iter().map(|v| f64::from(v.x)).sum::<f64>() / values.len() as f64;

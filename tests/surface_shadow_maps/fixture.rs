@@ -157,5 +157,5 @@ impl Fixture {
 }
 
 pub fn options(resolution: u32, sequence: Sequence) -> MapOptions {
-    MapOptions { resolution, sequence, bias: 1.0, until: MapUntil::Next }
+    MapOptions { resolution, sequence, bias: 1.0, until: MapUntil::Next, sharing: 0.0 }
 }

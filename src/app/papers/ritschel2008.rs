@@ -38,8 +38,9 @@ pub fn rows() -> Vec<Row> {
             rows.push(if resolution == 128 { row.slow() } else { row });
         }
     }
-    let church =
-        format!("builtin:church {MAPS} --set map_resolution=64 --set atlas_resolution=128 --set map_until=lit");
+    let church = format!(
+        "builtin:church {MAPS} --set map_resolution=64 --set atlas_resolution=128 --set map_until=lit --set map_sharing=2"
+    );
     rows.push(
         Row::number(
             METHOD,

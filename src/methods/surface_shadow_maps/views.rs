@@ -53,7 +53,6 @@ impl SurfaceShadowMaps {
             Shown::Light => None,
             Shown::Atlas => Some(self.of_atlas(|texel| false_color::of_index(self.atlas.texels[texel].chart))),
             Shown::TraversalOrder => {
-                let last = self.atlas.texels.len().saturating_sub(1).max(1) as f32;
                 let places = match &self.maps {
                     Some(placed) => placed.maps.places.clone(),
                     None => {
@@ -63,6 +62,7 @@ impl SurfaceShadowMaps {
                         places
                     }
                 };
+                let last = places.iter().copied().max().unwrap_or(0).max(1) as f32;
                 Some(self.of_atlas(|texel| false_color::of_amount(places[texel] as f32 / last)))
             }
             Shown::DepthMap => Some(self.depth_map(texel)),

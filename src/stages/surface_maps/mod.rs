@@ -22,12 +22,14 @@ mod compress;
 mod outside;
 mod placed;
 pub mod sequence;
+mod sharing;
 
 pub use cache::{Found, Key};
 pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, PackedRuns, Run};
 pub use outside::{Ball, MovingMaps, MovingTables, texel_objects};
 pub use placed::PlacedMaps;
 pub use sequence::Sequence;
+pub use sharing::Sharing;
 
 use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
@@ -45,11 +47,11 @@ const CHUNK_RAYS: usize = 1 << 19;
 /// Why there are no maps.
 #[derive(Debug, thiserror::Error)]
 pub enum SurfaceMapError {
-    #[error("{texels} texels; maps can be made of {MAX_PLACES} at most: lower atlas_resolution")]
+    #[error("{texels} texels; maps can be made of {MAX_PLACES} at most: lower atlas_resolution or raise map_sharing")]
     TooManyTexels { texels: usize },
     #[error(
-        "compressed maps take {bytes} bytes after {done} of {texels} texels, {allowed} are allowed; lower map_resolution or \
-         atlas_resolution"
+        "compressed maps take {bytes} bytes after {done} of {texels} maps, {allowed} are allowed; lower map_resolution or \
+         atlas_resolution, or raise map_sharing"
     )]
     OutOfMemory { bytes: u64, done: usize, texels: usize, allowed: u64 },
     #[error(transparent)]
@@ -89,13 +91,15 @@ pub struct MapOptions {
     /// How far depths keep from the surfaces they tell apart, in widths of a pixel.
     pub bias: f32,
     pub until: MapUntil,
+    /// Texels that share maps are less than so many texels apart; 0: none does.
+    pub sharing: f32,
 }
 
 /// The maps on the device.
 pub struct SurfaceMaps {
     pub options: MapOptions,
     pub maps: CompressedMaps,
-    /// Place in the sequence of each texel.
+    /// Place in the sequence of the map that each texel looks through.
     pub places: Vec<u32>,
     /// Where the maps stand, by place, metres.
     pub origins: Buffer<Vec3>,
@@ -154,17 +158,16 @@ impl SurfaceMaps {
         options: MapOptions,
         watch: &dyn Watch,
     ) -> Result<Self, SurfaceMapError> {
-        let atlas = input.atlas;
-        if atlas.texels.len() > MAX_PLACES {
-            return Err(SurfaceMapError::TooManyTexels { texels: atlas.texels.len() });
-        }
-        let mut order = sequence::walk(atlas, options.sequence);
-        if let Some(apart) = input.apart {
+        let mut order = sequence::walk(input.atlas, options.sequence);
+        let texel_objects = input.apart.map(|apart| apart.texel_objects);
+        if let Some(objects) = texel_objects {
             // One object after the other.
-            order.sort_by_key(|&texel| apart.texel_objects[texel as usize]);
+            order.sort_by_key(|&texel| objects[texel as usize]);
         }
-        let mut places = vec![0; order.len()];
-        order.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
+        let Sharing { order, places } = Sharing::new(input.atlas, &order, texel_objects, options.sharing);
+        if order.len() > MAX_PLACES {
+            return Err(SurfaceMapError::TooManyTexels { texels: order.len() });
+        }
         let Placement { origins, normals, offset, codes_per_metre } = Placement::new(&input, &order);
 
         let is_lit = options.until == MapUntil::Lit;
