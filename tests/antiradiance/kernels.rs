@@ -153,7 +153,7 @@ fn a_step_agrees_with_its_twin() {
     }
 }
 
-/// Transfers cut into windows give the same light, to the bit.
+/// Transfers cut into windows, and links spread over buffers, give the same light, to the bit.
 #[test]
 fn a_low_buffer_limit_gives_the_same_light() {
     let light = |limit: Option<u64>| {
@@ -165,15 +165,18 @@ fn a_low_buffer_limit_gives_the_same_light() {
             Settings {
                 bins: linklight::methods::antiradiance::BinCount::new(72).unwrap(),
                 half_tables: true,
+                refinement: 0.3,
                 ..settings(128)
             },
         );
         let windows = method.report().transfer_windows;
-        (windows, crate::support::solve(&context, &mut method, &fixture, 2).indirect)
+        let parts = method.links().parts().count();
+        println!("{windows} windows, links in {parts} buffers");
+        ((windows, parts), crate::support::solve(&context, &mut method, &fixture, 2).indirect)
     };
     // The queue of pairs is what needs the most otherwise.
     let (whole, few) = (light(None), light(Some(900_000)));
-    assert_eq!(whole.0, 1);
-    assert!(few.0 > 1, "{} windows", few.0);
+    assert_eq!(whole.0, (1, 1));
+    assert!(few.0.0 > 1 && few.0.1 > 1, "{:?} windows and buffers", few.0);
     assert!(whole.1 == few.1);
 }
