@@ -5,7 +5,6 @@ use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{prepare, relative_rmse, settings, solve};
 use crate::twins;
 use glam::{DVec3, Vec3};
-use linklight::gpu::shaders::types::HierarchyLeaf;
 use linklight::methods::antiradiance::{Scheme, Settings, growth_rate};
 
 #[test]
