@@ -124,7 +124,7 @@ void gather(ivec2 pixel, uint index, uvec3 corners)
 
     float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
     options = GatherOptions(params.threshold, scale, params.white, params.operator, params.clamp_radii, params.jitter != 0, params.sample_index, params.chance_below);
-    lobe_draw = fract(unit_interval(pcg4d(uvec4(index, 0u, 3u, params.seed))).xyz + float(params.sample_index) * vec3(0.7548777, 0.5698403, 0.6180340));
+    lobe_draw = fract(unit_interval(pcg4d(uvec4(index, 0u, 3u, params.seed))).xy + float(params.sample_index) * vec2(0.7548777, 0.5698403));
     // What the pixel shows before this gather: the mean of its samples so far, this one's direct light included.
     float samples_so_far = params.weight * float(params.sample_index + 1);
     start_showing(luminance(direct[index] + indirect[index]) / samples_so_far);

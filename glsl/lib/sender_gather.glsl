@@ -21,7 +21,7 @@ struct GatherOptions {
 GatherOptions options;
 
 Receiver receiver;
-vec3 lobe_draw;         // 0..1, of all senders alike: what of the specular lobe misses one of them hits another
+vec2 lobe_draw;         // 0..1, of all senders alike: what of the specular lobe misses one of them hits another
 float slack;            // how far rounding may have moved the receiver, metres
 float shown;            // what the pixel shows so far, as the display encodes it
 float shown_luminance;
@@ -127,7 +127,7 @@ Arrival arrival_of(uint node, uvec4 random, out float chance)
     // A leaf in the receiver's own plane is not in front of it, whatever rounding says.
     if (dot(sender_normal, receiver.position - leaf.centre) <= slack) return none;
     SenderPoint point;
-    if (!draw_point(leaf, receiver, sender_normal, u.xy, lobe_draw, options.jitter, point)) return none;
+    if (!draw_point(leaf, receiver, sender_normal, u.xyz, lobe_draw, options.jitter, point)) return none;
     vec3 lost, light = reflected_light(leaf, receiver, sender_normal, options.clamp_radii, point, lost);
     vec3 target = receiver.position + point.to + end_offset() * sender_normal;
     return Arrival(light * emitted, light * reflected, lost * (emitted + reflected), target, slot);

@@ -25,20 +25,20 @@ float lobe_share(SenderLeaf leaf, Receiver r)
     float area = leaf_area(leaf);
     vec3 to_centre = leaf.centre - r.position;
     float in_lobe = peak * area / (dot(to_centre, to_centre) + area);
-    return specular_share(s, cos_eye) * in_lobe / (1.0 + in_lobe);
+    return specular_share(s, cos_eye) * in_lobe * in_lobe / (1.0 + in_lobe * in_lobe);
 }
 
-// `u` draws among the leaf's points, `lobe` in the receiver's lobe and between the two. False where the lobe draws a
+// `u` draws among the leaf's points and between the two, `lobe` in the receiver's lobe. False where the lobe draws a
 // direction that misses the leaf.
-bool draw_point(SenderLeaf leaf, Receiver r, vec3 sender_normal, vec2 u, vec3 lobe, bool jitter, out SenderPoint point)
+bool draw_point(SenderLeaf leaf, Receiver r, vec3 sender_normal, vec3 u, vec2 lobe, bool jitter, out SenderPoint point)
 {
     float share = jitter ? lobe_share(leaf, r) : 0.0;
-    point = SenderPoint(leaf.centre - r.position, jitter, share, lobe.z < share);
+    point = SenderPoint(leaf.centre - r.position, jitter, share, u.z < share);
     if (!point.by_lobe) {
-        if (jitter) point.to = leaf_point(leaf, u) - r.position;
+        if (jitter) point.to = leaf_point(leaf, u.xy) - r.position;
         return true;
     }
-    vec3 direction = specular_sample(r.surface, folded_eye(r.surface.normal, r.to_eye), lobe.xy);
+    vec3 direction = specular_sample(r.surface, folded_eye(r.surface.normal, r.to_eye), lobe);
     float along = dot(sender_normal, direction);
     if (along >= 0.0) return false;
     point.to = dot(sender_normal, point.to) / along * direction;
@@ -49,7 +49,7 @@ bool draw_point(SenderLeaf leaf, Receiver r, vec3 sender_normal, vec2 u, vec3 lo
 // that clamping takes. Moves the point where the horizon cuts the leaf.
 //
 // The diffuse part is exact near by, whichever point was drawn. The specular part of a leaf that fills the lobe, or is
-// filled by it, is drawn by both and weighted by the balance heuristic: it never exceeds what the lobe reflects, and is
+// filled by it, is drawn by both and weighted by the balance heuristic: it is at most twice what the lobe reflects, and is
 // right in the mean.                                                                                       [Veach1995]
 // Differs from [Ritschel2008]: there senders are points, and near ones are clamped.
 vec3 reflected_light(SenderLeaf leaf, Receiver r, vec3 sender_normal, float clamp_radii, inout SenderPoint point, out vec3 clamped)
