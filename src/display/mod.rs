@@ -24,6 +24,7 @@ pub mod glossy_texels;
 pub mod interface;
 pub mod irradiance_vector;
 pub mod lightmap;
+pub mod pixel_samples;
 pub mod shadow_maps;
 pub mod splat;
 pub mod tone_map;
@@ -49,7 +50,7 @@ pub struct PixelView {
 impl PixelView {
     /// One of `samples` places in each pixel of a picture of `size`.
     pub fn new(view: &View, size: UVec2, index: u32, samples: u32) -> Self {
-        let shift = -2.0 * sample_offset(index, samples) / size.as_vec2();
+        let shift = -2.0 * pixel_samples::sample_offset(index, samples) / size.as_vec2();
         let eye = match view.lens {
             Lens::Perspective { .. } => view.position.extend(1.0),
             Lens::Orthographic { .. } => (-view.forward).extend(0.0),
@@ -60,39 +61,6 @@ impl PixelView {
             forward: view.forward,
             eye_along: view.position.dot(view.forward),
             footprint: 1.0 / (samples.max(1) as f32).sqrt(),
-        }
-    }
-}
-
-/// Offsets within the pixel of `count` samples: even steps one way, of the golden ratio the other, both mirrored about the
-/// pixel's middle, so that few samples do not shift a picture.                                    [Roberts2018]
-///
-/// [Roberts2018]: crate::methods::PAPERS
-pub fn sample_offset(index: u32, count: u32) -> Vec2 {
-    let count = count.max(1);
-    let from_middle = f64::from(index) - 0.5 * f64::from(count - 1);
-    let golden = (0.5 + 0.618_033_988_749_894_8 * from_middle).rem_euclid(1.0) - 0.5;
-    Vec2::new((from_middle / f64::from(count)) as f32, golden as f32)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn samples_are_about_the_middle_of_the_pixel_and_fill_it() {
-        for count in [1, 2, 3, 4, 8, 16, 61] {
-            let offsets: Vec<Vec2> = (0..count).map(|index| sample_offset(index, count)).collect();
-            let sum: Vec2 = offsets.iter().sum();
-            assert!(sum.length() < 1e-4, "{count} samples shift a picture by {}", sum / count as f32);
-            assert!(offsets.iter().all(|offset| offset.abs().max_element() < 0.5));
-            // No part of either axis is left out by more than twice an even step.
-            for axis in 0..2 {
-                let mut along: Vec<f32> = offsets.iter().map(|offset| offset[axis]).chain([-0.5, 0.5]).collect();
-                along.sort_by(f32::total_cmp);
-                let widest = along.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f32::max);
-                assert!(widest < 2.0 / count as f32, "{count} samples leave out {widest}");
-            }
         }
     }
 }

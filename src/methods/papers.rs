@@ -162,6 +162,14 @@ pub const PAPERS: &[Paper] = &[
         doi: Some("10.1137/0713071"),
     },
     DACHSBACHER_2007,
+    Paper {
+        key: "Dammertz2008",
+        title: "Image Synthesis by Rank-1 Lattices",
+        authors: "Holger Dammertz, Alexander Keller",
+        year: 2008,
+        venue: "Monte Carlo and Quasi-Monte Carlo Methods 2006, Springer",
+        doi: None,
+    },
     DONG_2007,
     Paper {
         key: "Duff2017",
