@@ -49,8 +49,8 @@ bool draw_point(SenderLeaf leaf, Receiver r, vec3 sender_normal, vec3 u, vec2 lo
 // that clamping takes. Moves the point where the horizon cuts the leaf.
 //
 // The diffuse part is exact near by, whichever point was drawn. The specular part of a leaf that fills the lobe, or is
-// filled by it, is drawn by both and weighted by the balance heuristic: it is at most twice what the lobe reflects, and is
-// right in the mean.                                                                                       [Veach1995]
+// filled by it, is drawn by both and weighted by the balance heuristic: metal reflects at most twice what its lobe does, and
+// all of it is right in the mean.                                                                          [Veach1995]
 // Differs from [Ritschel2008]: there senders are points, and near ones are clamped.
 vec3 reflected_light(SenderLeaf leaf, Receiver r, vec3 sender_normal, float clamp_radii, inout SenderPoint point, out vec3 clamped)
 {
