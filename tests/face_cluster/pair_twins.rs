@@ -206,6 +206,8 @@ struct Reaching {
     at_nodes: Vec<Vectors>,
     least: Vec<f64>,
     greatest: Vec<f64>,
+    /// No node gets any: light may pass between them, and no ray was asked.
+    is_dark: bool,
     /// The channel that errors are judged by.
     channel: usize,
 }
@@ -236,8 +238,9 @@ impl Reaching {
         let is_small = stake <= 1.0;
         let shares = free(is_small);
         if shares.iter().all(|&share| share == 0.0) {
-            quotients.push(stake / WORTH_LOOKING_ON);
-            return Outcome::new(if stake > WORTH_LOOKING_ON { split } else { DONE }, quotients);
+            let worth = if self.is_dark { 1.0 } else { WORTH_LOOKING_ON };
+            quotients.push(stake / worth);
+            return Outcome::new(if stake > worth { split } else { DONE }, quotients);
         }
         for (r, &share) in shares.iter().enumerate() {
             self.at_nodes[r].iter_mut().for_each(|v| *v *= share);
@@ -268,7 +271,7 @@ impl Reaching {
 
 /// Shares of the nodes, of those that were asked: of the others, and of a small pair's, the mean.
 fn shares_of(asked: &[(usize, f64)], count: usize, is_small: bool) -> Vec<f64> {
-    let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len() as f64;
+    let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len().max(1) as f64;
     let all: Vec<f64> = asked.iter().map(|(_, share)| *share).collect();
     let of = |r: usize| {
         let own: Vec<f64> = asked.iter().filter(|(node, _)| *node == r).map(|(_, share)| *share).collect();
@@ -354,7 +357,7 @@ pub fn transport(
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
     let turn = (a.cluster * 7 + b.cluster * 13) as usize;
     let passed = [[a.first_place, a.place_count], [b.first_place, b.place_count]];
-    let reaching = Reaching { at_nodes, least, greatest, channel };
+    let reaching = Reaching { at_nodes, least, greatest, is_dark: false, channel };
     let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
     let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
     let ray = |r: usize, s: usize| {
@@ -404,6 +407,26 @@ fn falloff(light: &Light, way: DVec3) -> f64 {
     (1.0 - ratio.powi(4)).clamp(0.0, 1.0) * if light.kind == 1 { in_cone } else { 1.0 }
 }
 
+/// The most that a lamp may send anywhere within a sphere, W/m2.
+fn most_irradiance(light: &Light, center: DVec3, radius: f64) -> f64 {
+    let intensity = f64::from(light.intensity.max_element());
+    if light.kind == 2 {
+        return intensity;
+    }
+    let offset = center - light.position.as_dvec3();
+    let distance = offset.length();
+    let nearest = (distance - radius).max(0.01 * radius);
+    let mut to_lamp = -light.direction.as_dvec3() * nearest;
+    if light.kind == 1 && distance > radius {
+        let (axis, reach) = (light.direction.as_dvec3(), (radius / distance).asin());
+        let angle = (offset.dot(axis) / distance).clamp(-1.0, 1.0).acos();
+        let turned = (angle - reach).max(0.0);
+        let aside = axis.cross(if axis.x.abs() < 0.5 { DVec3::X } else { DVec3::Y }).normalize();
+        to_lamp = -(axis * turned.cos() + aside * turned.sin()) * nearest;
+    }
+    intensity * falloff(light, to_lamp) / to_lamp.length_squared()
+}
+
 /// `transport_lights`.
 pub fn transport_light(
     t: &Tables,
@@ -421,11 +444,13 @@ pub fn transport_light(
             (to.normalize(), light.intensity.as_dvec3() * falloff(light, to) / to.length_squared(), to.length())
         }
     };
+    let around = most_irradiance(light, a.center.as_dvec3(), a.half_extent.as_dvec3().length());
+    let is_dark = |r: usize| of(r).1.max_element() <= 0.0;
     let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
     for r in 0..t.receiver_nodes {
         let (direction, arrives, _) = of(r);
         least.push(arrives.max_element() * least_area(a, direction));
-        greatest.push(arrives.max_element() * most_area(a, direction));
+        greatest.push(if is_dark(r) { around } else { arrives.max_element() } * most_area(a, direction));
         let kept = kept_vector(t, a, direction);
         at_nodes.push([0, 1, 2].map(|c| kept * arrives[c]));
     }
@@ -434,6 +459,7 @@ pub fn transport_light(
         at_nodes,
         least,
         greatest: greatest.clone(),
+        is_dark: (0..t.receiver_nodes).all(is_dark),
     };
     let passed = [[a.first_place, a.place_count], [0, 0]];
     let ray = |r: usize| {
@@ -449,6 +475,7 @@ pub fn transport_light(
     let first = a.cluster as usize % receivers;
     let free = |is_small: bool| -> Vec<f64> {
         let order = (0..receivers).map(|k| if is_small { (first + k) % receivers } else { k });
+        let order = order.filter(|&r| !is_dark(r));
         let faced = order.clone().filter(|&r| of(r).0.dot(normals[r].as_dvec3()) > 0.0);
         let mut asked: Vec<usize> = faced.take(if is_small { 1 } else { receivers }).collect();
         if asked.is_empty() {

@@ -23,6 +23,27 @@ layout(push_constant, scalar) uniform Params {
 
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
 
+// The most that may arrive anywhere within a sphere, W/m2: a cone, or the end of a range, may pass between nodes.
+float most_irradiance(Light light, vec3 center, float radius)
+{
+    if (light.kind == LIGHT_DIRECTIONAL) return most(light.intensity);
+    vec3 offset = center - light.position, to_light;
+    float distance_to_center = length(offset), distance_to_light;
+    // The sphere's place that is nearest to the lamp, turned into its cone as far as the sphere goes.
+    float nearest = max(distance_to_center - radius, 0.01 * radius);
+    vec3 way = nearest * light.direction;
+    if (light.kind == LIGHT_SPOT && distance_to_center > radius) {
+        float sine_reach = radius / distance_to_center, cosine_reach = sqrt(1.0 - sine_reach * sine_reach);
+        float cosine = dot(offset, light.direction) / distance_to_center;
+        if (cosine < cosine_reach) {
+            float sine = sqrt(max(1.0 - cosine * cosine, 0.0)), turned = cosine * cosine_reach + sine * sine_reach;
+            vec3 aside = cross(light.direction, abs(light.direction.x) < 0.5 ? vec3(1, 0, 0) : vec3(0, 1, 0));
+            way = nearest * (turned * light.direction + sqrt(max(1.0 - turned * turned, 0.0)) * normalize(aside));
+        }
+    }
+    return most(light_irradiance(light, light.position + way, to_light, distance_to_light));
+}
+
 void main()
 {
     uint i = linear_index();
@@ -40,12 +61,15 @@ void main()
     float least[RECEIVER_NODES], greatest[RECEIVER_NODES];
     float greatest_of_all = 0.0;
     passed_places = uvec4(a.first_place, a.place_count, 0, 0);
+    float brightest_of_all = most_irradiance(light, a.center, length(a.half_extent));
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec3 x = receiver_node(receiver, r), direction;
         float distance_to_light;
         vec3 arrives = light_irradiance(light, x, direction, distance_to_light);
+        // Where none comes to the node, some may come beside it.
+        float brightest = most(arrives) > 0.0 ? most(arrives) : brightest_of_all;
         least[r] = most(arrives) * least_projected_area(a, direction);
-        greatest[r] = most(arrives) * most_projected_area(a, direction);
+        greatest[r] = brightest * most_projected_area(a, direction);
         greatest_of_all = max(greatest_of_all, greatest[r]);
         at_nodes[r] = outerProduct(kept_vector(a, direction), arrives);
     }
@@ -54,6 +78,7 @@ void main()
         decisions[i] = SPLIT_RECEIVER;
         return;
     }
+    if (greatest_of_all <= 0.0) return;
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
     uint turn = a.cluster % RECEIVER_NODES, ray_count = 0;
     float free[RECEIVER_NODES], sum_free = 0.0;
@@ -65,7 +90,7 @@ void main()
         if (k >= RECEIVER_NODES && ray_count > 0) break;
         vec3 x = receiver_node(receiver, r), direction;
         float distance_to_light;
-        light_irradiance(light, x, direction, distance_to_light);
+        if (most(light_irradiance(light, x, direction, distance_to_light)) <= 0.0) continue;
         if (dot(direction, node_normal(receiver, r)) <= 0.0 && k < RECEIVER_NODES) continue;
         Ray ray = Ray(x, params.ray_offset, direction, min(distance_to_light, params.far));
         free[r] = greatest[r] > 0.0 ? visibility(a, ray) : 0.0;
@@ -77,7 +102,8 @@ void main()
     float mean_free = sum_free / float(max(ray_count, 1));
     if (sum_free <= 0.0) {
         // As in transport: what may still be free is looked for where it is too much to lose.
-        if (can_split(a) && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = SPLIT_RECEIVER;
+        float worth = ray_count > 0 ? WORTH_LOOKING_ON * params.threshold : params.threshold;
+        if (can_split(a) && a.most_albedo * greatest_of_all > worth) decisions[i] = SPLIT_RECEIVER;
         return;
     }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
