@@ -31,7 +31,7 @@ pub mod tone_map;
 pub mod vertex;
 
 use crate::scene::camera::{Lens, View};
-use glam::{Mat4, UVec2, Vec2, Vec3};
+use glam::{Mat4, UVec2, Vec3};
 
 /// A view as the passes of a picture take it: shifted within the pixel for antialiasing.
 #[derive(Debug, Clone, Copy)]
