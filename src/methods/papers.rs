@@ -392,6 +392,14 @@ pub const PAPERS: &[Paper] = &[
         venue: "High-Performance Graphics",
         doi: Some("10.1145/3105762.3105773"),
     },
+    Paper {
+        key: "Zhang2010",
+        title: "On Maximum-Principle-Satisfying High Order Schemes for Scalar Conservation Laws",
+        authors: "Xiangxiong Zhang, Chi-Wang Shu",
+        year: 2010,
+        venue: "Journal of Computational Physics 229(9)",
+        doi: None,
+    },
 ];
 
 #[cfg(test)]
