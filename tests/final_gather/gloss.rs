@@ -61,7 +61,7 @@ fn reflected(point: DVec3, roughness: f64) -> f64 {
 /// is above its integral.
 fn against_integral(gather: &Gather, roughness: f64) -> [f64; 3] {
     let (mut sum, mut expected, mut squares, mut above, mut count) = (0.0, 0.0, 0.0, 0.0f64, 0.0);
-    let on_floor = |pixel: &usize| pixel % 3 == 0 && gather.normals[*pixel].y > 0.5;
+    let on_floor = |pixel: &usize| pixel.is_multiple_of(3) && gather.normals[*pixel].y > 0.5;
     for pixel in (0..gather.normals.len()).filter(on_floor) {
         let value = f64::from(gather.direct[pixel].x);
         let integral = reflected(gather.positions[pixel].as_dvec3(), roughness);
