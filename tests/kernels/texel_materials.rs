@@ -173,7 +173,7 @@ fn tall(side: u32, texel: impl Fn(u32, u32) -> u8) -> Image {
 #[test]
 fn a_fine_texture_counts_by_its_mean_over_the_texel() {
     let context = TestContext::new();
-    let checker = |x: u32, y: u32| if (x + y) % 2 == 0 { 255 } else { 0 };
+    let checker = |x: u32, y: u32| if (x + y).is_multiple_of(2) { 255 } else { 0 };
     let scenes = [
         ("as it is", textured(image(128, false, |x, y| [checker(x, y); 3])), Vec3::new(0.5, 1.0, 0.25)),
         ("through a transform", through_a_transform(tall(128, checker)), Vec3::ONE),

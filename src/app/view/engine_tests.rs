@@ -223,7 +223,7 @@ fn a_second_picture_is_compared_step_by_step() {
     use crate::app::view::comparison::OtherJob;
     let context = context();
     let (mut ours, mut other) = (Engine::new(&context), Engine::new(&context));
-    let own = request("builtin:cornell-box --set rays_per_element=256 --spp 4");
+    let own = request("builtin:cornell-box --set rays_per_element=256 --spp 16");
     let film = ours.render(&own, &Unwatched).unwrap();
     let reference = request("builtin:cornell-box --method path-tracing");
     let mut job = Some(OtherJob::new(own, reference));
