@@ -47,7 +47,7 @@ fn of_bounce(json: &Value, bounce: u32) -> usize {
 fn every_method_and_display_is_explained_and_the_parts_make_the_pixel() {
     let folder = tempfile::tempdir().unwrap();
     for (options, most_off, links) in [
-        ("--method explicit-visibility", 1e-4, 20),
+        ("--method explicit-visibility", 1e-4, 12),
         ("--method implicit-visibility --set bins=8 --diffuse", 1e-4, 20),
         ("--method antiradiance --diffuse", 1e-4, 20),
         ("--method antiradiance --set scheme=symmetric --diffuse --display splat", 1e-4, 20),
