@@ -106,3 +106,16 @@ crate::settings! {
         pick: Pick = Pick::Nothing, paper "not given";
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn symmetric_steps_hold_a_bounce_each() {
+        let asymmetric = Settings { iterations: 5, scheme: Scheme::Asymmetric, ..Settings::default() };
+        let symmetric = Settings { scheme: Scheme::Symmetric, ..asymmetric };
+        assert_eq!([0, 1, 2].map(|bounces| asymmetric.bounces_held(bounces)), [0, 1, 2]);
+        assert_eq!([0, 1, 2].map(|bounces| symmetric.bounces_held(bounces)), [0, 5, 5]);
+    }
+}

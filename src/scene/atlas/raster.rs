@@ -78,16 +78,21 @@ mod tests {
             [Vec2::new(2.25, 2.25), Vec2::new(2.5, 2.25), Vec2::new(2.25, 2.75)],
         ];
         for [a, b, c] in triangles {
-            let (mut area, mut moment) = (0.0, Vec2::ZERO);
+            let (mut area, mut moment, mut second) = (0.0, Vec2::ZERO, Vec2::ZERO);
             cover([a, b, c], |part| {
                 assert!(part.share <= 1.0 + 1e-5);
                 assert!((part.centre - part.texel.as_vec2() - 0.5).abs().max_element() <= 0.5 + 1e-5);
                 area += part.share;
                 moment += part.share * part.centre;
+                let corner = part.texel.as_vec2();
+                second += part.share * (part.squares + corner * (2.0 * part.centre - corner));
             });
             let expected = 0.5 * (b - a).perp_dot(c - a).abs();
             assert!((area - expected).abs() < 1e-4 * expected, "{area} for {expected}");
-            assert!((moment / area).distance((a + b + c) / 3.0) < 1e-4);
+            let sum = a + b + c;
+            assert!((moment / area).distance(sum / 3.0) < 1e-4);
+            let squares = (a * a + b * b + c * c + sum * sum) / 12.0;
+            assert!((second / area).distance(squares) < 1e-3, "{} for {squares}", second / area);
         }
         cover([Vec2::ONE; 3], |part| panic!("a point covers nothing: {part:?}"));
     }
