@@ -126,6 +126,9 @@ fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
     let gpu_assisted = variable("LINKLIGHT_SOAK_ASSISTED").is_some();
     let context = Context::new(Options { validation: true, gpu_assisted, ..Options::default() }).unwrap();
     let settings = SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings);
+    // The tea room has 1,746 charts.
+    let atlas = if scene == "tea-room" { "atlas_resolution=64" } else { "atlas_resolution=40" };
+    let settings = settings.replace("atlas_resolution=40", atlas);
     let elements = variable("LINKLIGHT_SOAK_ELEMENTS")
         .filter(|_| !["path-tracing", "surface-shadow-maps", "face-cluster"].contains(&method))
         .map_or(String::new(), |count| format!("--elements {count}"));
