@@ -16,6 +16,7 @@ mod lobe_light;
 mod oracle;
 mod passes;
 mod physics;
+mod shadows;
 mod sky;
 mod sweep;
 mod trees;

@@ -4,83 +4,110 @@
 #include "lib/emitter.glsl"
 #include "lib/quadtree.glsl"
 
-// One thread per leaf of a window and word of samples: which points on emitters it sees. The bins are an omnidirectional
-// shadow map whose pixels say which surface is there: that surface, not the pixel, hides the point.            [Dong2007 3]
-// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, surfels, node_segments [node_count], segments,
-// samples[sample_count], triangles, positions   writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
+// One thread per leaf of a window and word of samples: which points on emitters it sees. The bins of both are an
+// omnidirectional shadow map whose pixels say which surface is there: that surface, not the pixel, hides the point.
+//                                                                                                  [Dong2007 3]
+// reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, samples[sample_count], triangles, positions,
+// sample_slots[sample_count] (of emitter_winners, front and back), emitter_leaves, emitter_winners[6 n n * emitter leaves],
+// walk_texels, walk_starts[node_count], leaf_cells, corner_texels
+// writes visible[element_count * ceil(sample_count / 32)] (bits)   shared none
 // Differs from [Dong2007]: every point is tested, so that an emitter smaller than a bin keeps its size and its shadow.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Winners { uint winners[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Receivers { Receiver receivers[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer LeafElements { uint leaf_elements[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Surfels { Surfel surfels[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer Samples { EmitterSample samples[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer Triangles { uvec3 triangles[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer Positions { vec3 positions[]; };
-layout(set = 0, binding = 7, scalar) writeonly buffer Visible { uint visible[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer NodeSegments { uint node_segments[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer Segments { QuadtreeSegment segments[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer Samples { EmitterSample samples[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer SampleSlots { uvec2 sample_slots[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer EmitterLeaves { uint emitter_leaves[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer EmitterWinners { uint emitter_winners[]; };
+layout(set = 0, binding = 9) uniform usamplerBuffer walk_texels;
+layout(set = 0, binding = 10, scalar) readonly buffer WalkStarts { uint walk_starts[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer LeafCells { LeafCell leaf_cells[]; };
+layout(set = 0, binding = 12) uniform usamplerBuffer corner_texels;
+layout(set = 0, binding = 13, scalar) writeonly buffer Visible { uint visible[]; };
 layout(push_constant, scalar) uniform Params {
     uint first_leaf;
     uint leaf_count;    // of the window
     uint n;
     uint sample_count;
+    uint all_leaves;
+    float ray_offset;   // m
 } params;
 
-// Neighbours of a winner that tell whether its surface goes on: what lies below the node two levels up.
-const uint NEIGHBOURS = 16;
-// So much of its extent off its plane, and a surfel's ellipse does not tell where its surface is.
-const float BENT = 0.02;
+const float RIM = 1e-5;     // barycentric coordinates are off by so much: nothing passes between triangles
 
-// Where a surfel's plane passes between the receiver and the point.
-struct Crossing {
-    bool is_between;
-    bool is_within;     // in its ellipse
-    bool is_beside;     // no farther off than the next bins are
-};
-
-Crossing crossing_of(Surfel s, vec3 origin, vec3 point)
+// Whether a triangle around the leaf's vertex crosses the way.
+bool is_leaf_met(uint leaf, vec3 origin, vec3 way)
 {
-    float of_origin = dot(s.normal, origin - s.centre), of_point = dot(s.normal, point - s.centre);
-    float slack = s.thickness + 0.02 * s.extent;
-    bool is_between = of_origin > 0.0 ? of_point < -slack : of_point > slack;
-    vec3 met = mix(origin, point, of_origin / (of_origin - of_point)), there = met - s.centre;
-    float x = dot(s.g1, there), y = dot(s.g2, there), reach = s.extent + 2.0 / float(params.n) * length(met - origin);
-    return Crossing(is_between, is_between && x * x + y * y <= 1.0, is_between && dot(there, there) <= reach * reach);
+    LeafCell cell = leaf_cells[leaf];
+    vec3 to_vertex = cell.vertex - origin;
+    bool is_met = false;
+    for (uint k = cell.first_corner; k < cell.first_corner + cell.corner_count; ++k) {
+        vec3 along_p = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * k)).xyz);
+        vec3 along_q = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * k + 1)).xyz);
+        vec3 across = cross(along_p, along_q);
+        float t = dot(across, to_vertex) / dot(across, way);
+        vec3 from_vertex = t * way - to_vertex;
+        float p = dot(along_p, from_vertex), q = dot(along_q, from_vertex);
+        is_met = is_met || (t > 0.0 && t < 1.0 && min(p, q) >= -RIM && p + q <= 1.0 + RIM);
+    }
+    return is_met;
 }
 
-// A point is hidden where the surface of a winner of one of the four bins around its direction passes before it: the winner
-// itself, or where the surface goes on. Bent ones, whose place between the bins is not known, hide what is nearer to the
-// directions of such winners than to others'.
-bool is_visible(uint local, Receiver at, vec3 point)
+// Whether anything below a step of the walk does.
+bool is_met(uint start, vec3 origin, vec3 way)
 {
-    vec3 direction = turn_back(at.frame, point - at.origin);
+    uint step_there = start, end = texelFetch(walk_texels, int(WALK_TEXELS * start + 2)).y;
+    float squared = dot(way, way);
+    bool is_hit = false;
+    do {
+        vec4 centre = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * step_there)));
+        vec3 normal = uintBitsToFloat(texelFetch(walk_texels, int(WALK_TEXELS * step_there + 1)).xyz);
+        uvec4 rest = texelFetch(walk_texels, int(WALK_TEXELS * step_there + 2));
+        vec3 offset = centre.xyz - origin, beside = offset - clamp(dot(offset, way) / squared, 0.0, 1.0) * way;
+        // It lies within a sphere and between two planes.
+        float above = -dot(normal, offset), above_at_end = above + dot(normal, way), thickness = uintBitsToFloat(rest.z);
+        bool is_near = dot(beside, beside) <= centre.w * centre.w && min(above, above_at_end) <= thickness
+                       && max(above, above_at_end) >= -thickness;
+        bool is_leaf = rest.x < params.all_leaves;
+        if (is_near && is_leaf) is_hit = is_leaf_met(rest.x, origin, way);
+        step_there = is_near && !is_leaf ? step_there + 1 : rest.y;
+    } while (step_there < end && !is_hit);
+    return is_hit;
+}
+
+// One of the four bins around a direction, across the cube's edges too.
+uint bin_beside(vec3 direction, uint corner)
+{
     uint face = face_of(direction);
     vec3 in_axes = in_face(face, direction);
-    vec2 place = (0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5, low = floor(place), share = place - low;
-    uint looked_at = EMPTY_BIN;     // neighbours that do not hide it
-    float hidden = 0.0;
-    for (uint corner = 0; corner < 4; ++corner) {
-        // Beyond the face's rim the direction leads to a neighbouring face.
-        vec2 side = vec2(corner & 1, corner >> 1), uv = (2.0 * (low + side) + 1.0) / float(params.n) - 1.0;
-        uint winner = winners[bin_of(face_direction(face, uv), params.n) * params.leaf_count + local];
-        if (winner == EMPTY_BIN) continue;
-        uint node = winner & NODE_MASK;
-        Surfel s = surfels[node];
-        Crossing own = crossing_of(s, at.origin, point);
-        if (own.is_within) return false;
-        vec2 weights = mix(1.0 - share, share, side);
-        if (own.is_beside && s.thickness > BENT * s.extent) hidden += weights.x * weights.y;
-        QuadtreeSegment level = segments[node_segments[node]];
-        uint first = level.first + (node - level.first) / NEIGHBOURS * NEIGHBOURS;
-        if (!own.is_between || first == looked_at) continue;
-        uint last = min(first + NEIGHBOURS, level.first + level.count);
-        for (uint k = first; k < last; ++k) {
-            if (crossing_of(surfels[k], at.origin, point).is_within) return false;
-        }
-        looked_at = first;
-    }
-    return hidden <= 0.5;
+    vec2 low = floor((0.5 * in_axes.xy / in_axes.z + 0.5) * float(params.n) - 0.5);
+    vec2 uv = (2.0 * (low + vec2(corner & 1, corner >> 1)) + 1.0) / float(params.n) - 1.0;
+    return bin_of(face_direction(face, uv), params.n);
+}
+
+// A point is hidden where the surface of a winner passes before it: of the bins around its direction, which know what stands
+// near the leaf, and of those of its emitter around the way back, which know what stands near the point. The surface is all
+// that lies below the node two levels above the winner.
+bool is_visible(uint local, Receiver at, uint slot, Receiver from, vec3 point)
+{
+    vec3 way = point - at.origin;
+    uvec4 looked_at = uvec4(EMPTY_BIN), looked_back_at = uvec4(EMPTY_BIN);
+    bool is_hidden = false;
+    uint corner = 0;
+    do {
+        uint winner = EMPTY_BIN;
+        if (corner < 4) winner = winners[bin_beside(turn_back(at.frame, way), corner) * params.leaf_count + local];
+        else winner = emitter_winners[slot * 6 * params.n * params.n + bin_beside(turn_back(from.frame, -way), corner - 4)];
+        uint start = winner == EMPTY_BIN ? EMPTY_BIN : walk_starts[winner & NODE_MASK];
+        bool is_new = start != EMPTY_BIN && all(notEqual(looked_at, uvec4(start))) && all(notEqual(looked_back_at, uvec4(start)));
+        if (is_new) is_hidden = is_met(start, at.origin, way);
+        if (corner < 4) looked_at[corner] = start;
+        else looked_back_at[corner - 4] = start;
+    } while (++corner < 8 && !is_hidden);
+    return !is_hidden;
 }
 
 void main()
@@ -97,7 +124,11 @@ void main()
         EmitterPoint point = emitter_point(s, positions[v.x], positions[v.y], positions[v.z]);
         vec3 offset = point.position - at.origin;
         if (dot(offset, at.normal) <= 0.0 || emitter_cosine(s, point, -offset) <= 0.0) continue;
-        if (is_visible(local, at, point.position)) bits |= 1u << k;
+        // As shadow rays do, end a little before the emitter, on the side that is seen.
+        bool is_back = dot(point.normal, offset) > 0.0;
+        vec3 end = point.position + point.normal * (is_back ? -params.ray_offset : params.ray_offset);
+        uint slot = is_back ? sample_slots[word * 32 + k].y : sample_slots[word * 32 + k].x;
+        if (is_visible(local, at, slot, receivers[emitter_leaves[slot]], end)) bits |= 1u << k;
     }
     visible[leaf_elements[params.first_leaf + local] * words + word] = bits;
 }

@@ -33,6 +33,7 @@ mod gloss;
 mod linking;
 mod report;
 mod settings;
+mod shadows;
 mod views;
 pub mod windows;
 
@@ -55,6 +56,7 @@ use crate::stages::{emitters::Emitters, punctual};
 use glam::Vec3;
 use gloss::Gloss;
 use linking::Sizes;
+use shadows::Shadows;
 
 /// The method on one scene.
 pub struct ImplicitVisibility {
@@ -64,6 +66,7 @@ pub struct ImplicitVisibility {
     trees: Quadtrees,
     emitters: Emitters,
     linking: Linking,
+    shadows: Shadows,
     gloss: Gloss,
     state: State,
     /// At the density of the bins.
@@ -124,6 +127,7 @@ impl ImplicitVisibility {
         let needed = sizes.bytes()
             + Elements::bytes_needed(&topology)
             + Quadtrees::bytes_needed(&tree_topology, topology.incident.values.len())
+            + Shadows::bytes_needed(&settings)
             + (4 * count * light_words + ray_bytes) as u64;
         let (available, elements) = (context.available_bytes(), count as u64);
         if needed > available {
@@ -135,6 +139,7 @@ impl ImplicitVisibility {
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, geometry, rest_positions, &elements, choice, samples)?;
         let linking = Linking::new(context, &trees, &settings, sizes)?;
+        let shadows = Shadows::new(context, &trees, &elements, &emitters, &geometry.triangles, &settings)?;
         let glossy = Gloss::find(context, &trees, &elements, world, settings.glossy)?;
         let (needed, available) =
             (Gloss::bytes_needed(&glossy.0, &trees, settings.glossy_bins), context.available_bytes());
@@ -154,6 +159,7 @@ impl ImplicitVisibility {
             trees,
             emitters,
             linking,
+            shadows,
             gloss,
             state,
             environment: WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?,
@@ -181,7 +187,8 @@ impl ImplicitVisibility {
         let mut recorder = context.recorder("implicit-visibility")?;
         recorder.scope("see lights", |recorder| {
             self.survey(recorder);
-            self.see_emitters(recorder, world);
+            let seen_by = (&self.trees, &self.elements, &self.emitters);
+            self.shadows.see_emitters(recorder, world, seen_by, &self.linking, &self.settings);
             let State { rays, is_free, visibility, .. } = &self.state;
             self.report.light_rays =
                 punctual::trace_visibility(recorder, &stage.tracer, world, &self.elements, rays, is_free, visibility);
@@ -217,37 +224,6 @@ impl ImplicitVisibility {
                 },
             };
             recorder.dispatch(&pass, leaves.len());
-        }
-    }
-
-    /// Which points on sampled emitters each element sees, by its bins.
-    fn see_emitters(&self, recorder: &mut Recorder<'_>, world: &World) {
-        let sample_count = self.emitters.plan.samples.len() as u32;
-        if sample_count == 0 {
-            return;
-        }
-        recorder.fill(&self.emitters.visible, 0);
-        for window in &self.linking.windows {
-            let leaves = window.plan.leaves();
-            let pass = passes::SeeEmitters {
-                winners: &window.winners,
-                receivers: &self.linking.receivers,
-                leaf_elements: &self.trees.leaf_elements,
-                surfels: &self.trees.surfels,
-                node_segments: &self.trees.node_segments,
-                segments: &self.trees.segments,
-                samples: &self.emitters.samples,
-                triangles: &world.triangles,
-                positions: &world.positions,
-                visible: &self.emitters.visible,
-                params: passes::SeeEmittersParams {
-                    first_leaf: leaves.start,
-                    leaf_count: leaves.len() as u32,
-                    n: self.settings.bins,
-                    sample_count,
-                },
-            };
-            recorder.dispatch(&pass, leaves.len() * sample_count.div_ceil(32) as usize);
         }
     }
 

@@ -33,6 +33,9 @@ pub struct Quadtrees {
     walk: Buffer<WalkStep>,
     /// The same with what a walk looks at, `WALK_TEXELS` per node.
     pub walk_texels: TexelBuffer,
+    /// Per node: the step of the node two levels above it (the root where there are fewer), whose subtree holds what lies
+    /// around it.
+    pub walk_starts: Buffer<u32>,
 }
 
 /// Texels of a step of the walk and of a corner of a leaf's cell; the layouts are those of `lib/quadtree.glsl`.
@@ -44,6 +47,7 @@ impl Quadtrees {
     /// `corner_count` is the number of the elements' incident triangles.
     pub fn new(context: &Context, topology: QuadtreeTopology, corner_count: usize) -> Result<Self, GpuError> {
         let count = topology.node_count() as usize;
+        let walk = topology.walk();
         Ok(Self {
             leaf_elements: context.upload("quadtree/leaf elements", &topology.leaf_elements)?,
             node_segments: context.upload("quadtree/node segments", &topology.node_segments)?,
@@ -52,7 +56,8 @@ impl Quadtrees {
             moments: context.buffer("quadtree/moments", count)?,
             leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
             corner_texels: context.texel_buffer("quadtree/corner texels", (CORNER_TEXELS * corner_count).max(1))?,
-            walk: context.upload("quadtree/walk", &topology.walk())?,
+            walk_starts: context.upload("quadtree/walk starts", &topology.steps_above(&walk, 2))?,
+            walk: context.upload("quadtree/walk", &walk)?,
             walk_texels: context.texel_buffer("quadtree/walk texels", (WALK_TEXELS * count).max(1))?,
             topology,
         })
@@ -61,7 +66,7 @@ impl Quadtrees {
     /// Bytes of the tables of [`Self::new`].
     pub fn bytes_needed(topology: &QuadtreeTopology, corner_count: usize) -> u64 {
         let walk = size_of::<WalkStep>() + WALK_TEXELS * 16;
-        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + walk + 2 * size_of::<u32>();
+        let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + walk + 3 * size_of::<u32>();
         u64::from(topology.node_count()) * node as u64
             + u64::from(topology.leaf_count()) * (size_of::<LeafCell>() + size_of::<u32>()) as u64
             + (16 * CORNER_TEXELS * corner_count) as u64

@@ -132,6 +132,14 @@ impl QuadtreeTopology {
         steps
     }
 
+    /// Per node: the step of [`Self::walk`] of the node so many levels above it, or of its root.
+    pub fn steps_above(&self, walk: &[WalkStep], levels: u32) -> Vec<u32> {
+        let mut steps = vec![0; walk.len()];
+        walk.iter().zip(0..).for_each(|(at, step)| steps[at.node as usize] = step);
+        let above = |node: u32| (0..levels).fold(node, |node, _| self.parent(node).unwrap_or(node));
+        (0..self.node_count()).map(|node| steps[above(node) as usize]).collect()
+    }
+
     /// Nodes below and including a node.
     fn subtree_count(&self, node: u32) -> u32 {
         let mut count = 0;
