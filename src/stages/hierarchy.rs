@@ -11,7 +11,7 @@ use super::levels::Levels;
 use super::world::World;
 use crate::gpu::shaders::hierarchy as passes;
 use crate::gpu::shaders::types::{HierarchyLeaf, HierarchyNode, LeafShare};
-use crate::gpu::{Buffer, Context, GpuError, Recorder};
+use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::scene::facets::Facets;
 use crate::scene::patches::Patches;
 use crate::scene::surfaces::Surfaces;
@@ -25,6 +25,8 @@ pub const BLOCKS_BEHIND: u32 = 1;
 pub const REFLECTS_BEHIND: u32 = 2;
 /// Children of a node, at most.
 pub const MAX_CHILDREN: u32 = 4;
+/// Texels of a node; the same constant stands in `lib/packed_hierarchy.glsl`.
+const HIERARCHY_TEXELS: usize = 5;
 /// Levels that [`HierarchyPlan::new`] may go down before it halves by count instead of by place.
 const MIDPOINT_LEVELS: u32 = 24;
 
@@ -280,6 +282,8 @@ pub struct Hierarchy {
     pub plan: HierarchyPlan,
     pub nodes: Buffer<HierarchyNode>,
     pub leaves: Buffer<HierarchyLeaf>,
+    /// The nodes and their shapes for kernels over links, [`HIERARCHY_TEXELS`] each (`lib/packed_hierarchy.glsl`).
+    pub node_texels: TexelBuffer,
     /// See [`HierarchyPlan::members`] and [`HierarchyPlan::shares`].
     pub members: Buffer<u32>,
     pub shares: Buffer<LeafShare>,
@@ -294,6 +298,7 @@ impl Hierarchy {
         let hierarchy = Self {
             nodes: context.upload("hierarchy/nodes", &plan.nodes)?,
             leaves: context.upload("hierarchy/leaves", &plan.leaves)?,
+            node_texels: context.texel_buffer("hierarchy/node texels", (HIERARCHY_TEXELS * plan.nodes.len()).max(1))?,
             members: context.upload("hierarchy/members", &plan.members)?,
             shares: context.upload("hierarchy/shares", &plan.shares)?,
             share_offsets: context.upload("hierarchy/share offsets", &plan.share_offsets)?,
@@ -334,5 +339,12 @@ impl Hierarchy {
             let pass = passes::PullBounds { level_nodes: &self.levels.nodes, nodes: &self.nodes, params };
             recorder.dispatch(&pass, level.len());
         });
+        let pack = passes::PackNodes {
+            nodes: &self.nodes,
+            leaves: &self.leaves,
+            node_texels: self.node_texels.buffer(),
+            params: passes::PackNodesParams { node_count: self.node_count() },
+        };
+        recorder.dispatch(&pack, self.node_count());
     }
 }

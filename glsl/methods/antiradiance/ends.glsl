@@ -1,26 +1,38 @@
 #ifndef ENDS
 #define ENDS
 // The two nodes of a link, p the receiver and q the sender, and light between them.
-// The kernel binds leaves, cosine_norms[leaf_count], bin_directions[bin_count], spread_offsets, spread, and has params.bins
+// The kernel binds node_texels, cosine_norms[leaf_count], bin_directions[bin_count], spread_offsets, spread, and has params.bins
 // (BinParams).
 #include "lib/direction_bins.glsl"
-#include "lib/hierarchy.glsl"
+#include "lib/packed_hierarchy.glsl"
 #include "methods/antiradiance/solid_angle.glsl"
 
 const float FOUR_PI = 12.5663706143592;
 
 // An end of a link. Nodes within one flat surface have a normal like a leaf.
 struct End {
+    vec3 center, normal;
+    float area;
+    vec3 half_u, half_v;    // of a flat one's rectangle, half of its sides
     bool is_flat;
     bool passes_behind;     // nothing is received from behind
-    vec3 normal;
     float norm;
 };
 
-End end_of(HierarchyNode node)
+End end_of(uint node)
 {
-    if (node.shape == NONE) return End(false, false, vec3(0.0), 0.0);
-    return End(true, (leaves[node.shape].flags & BLOCKS_BEHIND) == 0, leaves[node.shape].normal, cosine_norms[node.shape]);
+    uvec4 texel_1 = NODE_TEXEL(node, 1), texel_3 = NODE_TEXEL(node, 3);
+    uint shape = NODE_TEXEL(node, 4).y;
+    End end;
+    end.center = uintBitsToFloat(NODE_TEXEL(node, 0).xyz);
+    end.normal = uintBitsToFloat(texel_1.xyz);
+    end.area = uintBitsToFloat(texel_1.w);
+    end.half_u = uintBitsToFloat(NODE_TEXEL(node, 2).xyz);
+    end.half_v = uintBitsToFloat(texel_3.xyz);
+    end.is_flat = shape != NONE;
+    end.passes_behind = end.is_flat && (texel_3.w & BLOCKS_BEHIND) == 0;
+    end.norm = end.is_flat ? cosine_norms[shape] : 0.0;
+    return end;
 }
 
 // Whether light along v is on the sides of both ends that p_cos and q_cos say.

@@ -2,23 +2,21 @@
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
 #include "lib/direction_bins.glsl"
-#include "lib/hierarchy.glsl"
 
 // One thread per link, both of its directions: writes what they transfer into the bins of one window, where count_transfers
 // had no room to keep it.
-// reads links, nodes, leaves, cosine_norms, bin_directions, spread_offsets, spread
+// reads links, node_texels, cosine_norms, bin_directions, spread_offsets, spread
 // updates cells[bin_count * node_count]: in, the place of each cell's first transfer; out, one beyond its last
 // writes transfers[window] (sender's entry of a table, weight), in any order within a cell   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Links { uvec2 links[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer SpreadOffsets { uint spread_offsets[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer Spread { SpreadEntry spread[]; };
-layout(set = 0, binding = 7, scalar) buffer Cells { uint cells[]; };
-layout(set = 0, binding = 8, scalar) writeonly buffer Transfers { uint64_t transfers[]; };
+layout(set = 0, binding = 1) uniform usamplerBuffer node_texels;     // HIERARCHY_TEXELS each
+layout(set = 0, binding = 2, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer SpreadOffsets { uint spread_offsets[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Spread { SpreadEntry spread[]; };
+layout(set = 0, binding = 6, scalar) buffer Cells { uint cells[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer Transfers { uint64_t transfers[]; };
 layout(push_constant, scalar) uniform Params {
     BinParams bins;
     uint link_count;

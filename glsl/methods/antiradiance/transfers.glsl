@@ -1,7 +1,7 @@
 #ifndef TRANSFERS
 #define TRANSFERS
 // What one link carries from its sender to its receiver: a list of (receiver's bin, sender's bin, weight).
-// The kernel binds nodes, leaves, cosine_norms[leaf_count], bin_directions[bin_count], spread_offsets, spread and
+// The kernel binds node_texels, cosine_norms[leaf_count], bin_directions[bin_count], spread_offsets, spread and
 // params.bins (BinParams), and defines the bridge, the second called once per entry of the list, the first before them:
 //     void transfers_follow(uint count)
 //     void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight)
@@ -21,7 +21,7 @@ const uint SAMPLES_A_SIDE = 4;              // of a footprint, at most
 const float MOST_SAMPLED = 4.0;             // bins: larger footprints are cones
 
 // A flat sender's rectangle, sample by sample: footprints that tile a surface tile the bins.
-void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, End q, End p, float coverage)
+void sampled(uint sender, uint receiver, End q, End p, float coverage)
 {
     uint side = clamp(uint(ceil(2.0 * sqrt(coverage))), 1u, SAMPLES_A_SIDE), count = side * side;
     // Samples side by side mostly fall into one bin, and most senders into one alone: what is summed up, and then those before.
@@ -34,7 +34,7 @@ void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, E
         vec2 own = vec2(0.0);
         if (s < count) {
             vec2 at = (vec2(s % side, s / side) + 0.5) / float(side) * 2.0 - 1.0;
-            vec3 offset = to.center - from.center - at.x * from.half_u - at.y * from.half_v;
+            vec3 offset = p.center - q.center - at.x * q.half_u - at.y * q.half_v;
             float squared = dot(offset, offset);
             if (!(squared > 0.0)) continue;
             vec3 w = offset / sqrt(squared);
@@ -42,7 +42,7 @@ void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, E
             vec3 v;
             bin = bin_between(p, q, w, v);
             if (bin == NONE) continue;
-            float covered = disc_solid_angle(from.area / float(count) * abs(dot(q.normal, w)) / squared) * float(params.bins.count) / FOUR_PI;
+            float covered = disc_solid_angle(q.area / float(count) * abs(dot(q.normal, w)) / squared) * float(params.bins.count) / FOUR_PI;
             own = vec2(weight_between(p, q, w, v, covered), covered);
             if (bin == current) {
                 sum += own;
@@ -72,23 +72,23 @@ void sampled(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, E
     for (uint k = 0; k < found; ++k) transfer(receiver, bins[k], sender, bins[k], sums[k].x / max(sums[k].y, 1.0));
 }
 
-void transfers_of(uint sender, uint receiver, HierarchyNode from, HierarchyNode to, End q, End p)
+void transfers_of(uint sender, uint receiver, End q, End p)
 {
-    vec3 offset = to.center - from.center;
+    vec3 offset = p.center - q.center;
     float squared = dot(offset, offset);
-    if (!(squared > 0.0) || from.area <= 0.0) return;
+    if (!(squared > 0.0) || q.area <= 0.0) return;
     vec3 w = offset / sqrt(squared);
     float q_cos = dot(q.normal, w);
-    float solid_angle = q.is_flat ? disc_solid_angle(from.area * abs(q_cos) / squared) : from.area / squared;
+    float solid_angle = q.is_flat ? disc_solid_angle(q.area * abs(q_cos) / squared) : q.area / squared;
     if (!(solid_angle > 0.0)) return;
     // All of the sender lies behind a surface that nothing reaches from there.
     if (p.passes_behind && q.is_flat
-        && dot(p.normal, offset) >= abs(dot(p.normal, from.half_u)) + abs(dot(p.normal, from.half_v))) return;
+        && dot(p.normal, offset) >= abs(dot(p.normal, q.half_u)) + abs(dot(p.normal, q.half_v))) return;
     float coverage = solid_angle * float(params.bins.count) / FOUR_PI;
 
     bool is_cone = params.bins.class_count > 0 && params.bins.is_gaussian == 0;
     if (is_cone && q.is_flat && coverage <= MOST_SAMPLED) {
-        sampled(sender, receiver, from, to, q, p, coverage);
+        sampled(sender, receiver, q, p, coverage);
         return;
     }
     // The class above, so that no bin is covered more than once and nothing is cut off.
@@ -138,16 +138,12 @@ void transfers_of(uint sender, uint receiver, HierarchyNode from, HierarchyNode 
 // Both directions of a link.
 void transfers_of_link(uvec2 link)
 {
-    HierarchyNode x = nodes[link.x], y = nodes[link.y];
-    End x_end = end_of(x), y_end = end_of(y);
+    End x = end_of(link.x), y = end_of(link.y);
     for (uint direction = 0; direction < 2; ++direction) {
-        transfers_of(link.x, link.y, x, y, x_end, y_end);
-        HierarchyNode node = x;
+        transfers_of(link.x, link.y, x, y);
+        End end = x;
         x = y;
-        y = node;
-        End end = x_end;
-        x_end = y_end;
-        y_end = end;
+        y = end;
         link = link.yx;
     }
 }

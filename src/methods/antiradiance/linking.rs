@@ -219,8 +219,7 @@ impl Making<'_> {
         let found_count = context.upload("antiradiance/found count", &[0u32])?;
         let pass_of = |links, link_count| passes::CountTransfers {
             links,
-            nodes: &hierarchy.nodes,
-            leaves: &hierarchy.leaves,
+            node_texels: &hierarchy.node_texels,
             cosine_norms: self.cosine_norms,
             bin_directions: &bins.directions,
             spread_offsets: &bins.spread_offsets,
@@ -299,8 +298,7 @@ impl Making<'_> {
         let (hierarchy, bins) = (self.hierarchy, self.bins);
         passes::FillTransfers {
             links,
-            nodes: &hierarchy.nodes,
-            leaves: &hierarchy.leaves,
+            node_texels: &hierarchy.node_texels,
             cosine_norms: self.cosine_norms,
             bin_directions: &bins.directions,
             spread_offsets: &bins.spread_offsets,

@@ -12,8 +12,8 @@ use std::f32::consts::PI;
 
 /// Pairs of one step of the queue.
 const QUEUE_BATCH: u32 = 8192;
-/// Links a leaf that a first attempt has room for.
-const FIRST_GUESS: u64 = 64;
+/// Links a leaf that a first attempt has room for; where there are more, they are counted by it, and made again.
+const FIRST_GUESS: u64 = 160;
 /// Buffers that links are spread over where one may not hold them, in `refine_links.comp`.
 const PARTS: usize = 4;
 /// 1.0 in bits.
@@ -29,11 +29,12 @@ pub struct NodeLinks {
 }
 
 impl NodeLinks {
-    /// Refines from the root's link to itself.                                     [Dachsbacher2007 3.2]
+    /// Refines from the root's link to itself; about `expected` links, 0 if nobody knows.     [Dachsbacher2007 3.2]
     pub fn refine(
         context: &Context,
         hierarchy: &Hierarchy,
         solid_angle: f32,
+        expected: u32,
         budget: u64,
     ) -> Result<Self, LinkingError> {
         // A node of four children with itself: six pairs and four selves.
@@ -46,7 +47,11 @@ impl NodeLinks {
         let link_bytes = size_of::<UVec2>() as u64;
         let largest_part = context.limits().storage_buffer_bytes / link_bytes;
         let available = budget.min(PARTS as u64 * largest_part * link_bytes);
-        let mut capacity = (FIRST_GUESS * u64::from(hierarchy.leaf_count())).max(1024).min(available / link_bytes);
+        let guess = match u64::from(expected) {
+            0 => FIRST_GUESS * u64::from(hierarchy.leaf_count()),
+            expected => expected + expected / 8,
+        };
+        let mut capacity = guess.max(1024).min(available / link_bytes);
         let seeds: &[UVec2] = if hierarchy.node_count() > 0 { &[UVec2::ZERO] } else { &[] };
         loop {
             let part_capacity = capacity.min(largest_part).max(1);
@@ -58,8 +63,7 @@ impl NodeLinks {
                 .collect::<Result<Vec<_>, _>>()?;
             let counters = queue.refine(context, "links", seeds, |recorder| {
                 let pass = passes::RefineLinks {
-                    nodes: &hierarchy.nodes,
-                    leaves: &hierarchy.leaves,
+                    node_texels: &hierarchy.node_texels,
                     taken_pairs: &queue.taken,
                     counters: &queue.counters,
                     pair_stack: &queue.stack,
@@ -132,8 +136,7 @@ impl NodeLinks {
         for (links, link_count) in self.parts() {
             let pass = passes::EvenLight {
                 links,
-                nodes: &hierarchy.nodes,
-                leaves: &hierarchy.leaves,
+                node_texels: &hierarchy.node_texels,
                 at_leaves: &at_leaves,
                 excess: &excess,
                 params: passes::EvenLightParams { link_count },

@@ -189,7 +189,7 @@ impl Antiradiance {
         tables.update_albedo(&mut recorder, &hierarchy, &elements);
         recorder.submit()?;
 
-        let links = NodeLinks::refine(context, &hierarchy, link_solid_angle(&settings), budget)?;
+        let links = NodeLinks::refine(context, &hierarchy, link_solid_angle(&settings), 0, budget)?;
         links.even_out(context, &hierarchy, &settings, &tables.scales)?;
         let transfers = Transfers::new(context, &links, &hierarchy, &bins, &tables.cosine_norms, &settings, budget)?;
         let mut method = Self {
@@ -231,7 +231,8 @@ impl Antiradiance {
         self.tables.update_albedo(&mut recorder, &self.hierarchy, &self.elements);
         recorder.submit()?;
         if !standing_links {
-            self.links = NodeLinks::refine(context, &self.hierarchy, link_solid_angle(&self.settings), u64::MAX)?;
+            let (solid_angle, expected) = (link_solid_angle(&self.settings), self.links.count);
+            self.links = NodeLinks::refine(context, &self.hierarchy, solid_angle, expected, u64::MAX)?;
         }
         self.links.even_out(context, &self.hierarchy, &self.settings, &self.tables.scales)?;
         // The old ones go first: two sets may not fit.
