@@ -3,7 +3,7 @@
 // What a receiver takes from the nodes of its cut: the oracle of the walk, and the light of a node by one of its leaves.
 // The kernel binds the tables of lib/sender_tree.glsl and lib/sender_leaf.glsl.
 #include "lib/random.glsl"
-#include "lib/sender_leaf.glsl"
+#include "lib/sender_gloss.glsl"
 #include "lib/sender_point.glsl"
 #include "lib/sender_walk.glsl"
 #include "lib/tone_curve.glsl"
@@ -108,17 +108,27 @@ Arrival arrival_of(uint node, uvec4 random, out float chance)
     chance = u.w;
     uint slot;
     vec3 emitted, reflected;    // as if all of the node's power came from the leaf, W/m2
+    vec3 by_lobe;               // of what the leaf's lobe sends
     if (options.jitter) {
         float probability;
         slot = draw_leaf(node, u.z, probability);
         LeafLight light = sender_leaf_light(slot);
         emitted = light.emitted / probability;
         reflected = light.reflected / probability;
+        by_lobe = vec3(1.0 / probability);
     } else {
         slot = sender_leaf(node);
         float area = leaf_area(sender_shape(slot));
         emitted = sender_emitted_power(node) / area;
         reflected = uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * node).xyz) / area - emitted;
+        by_lobe = vec3(0.0);
+    }
+    uint row = sender_gloss_row(slot);
+    if (row != 0 && !options.jitter) {
+        // All of it by the leaf's own directions.
+        vec3 even = sender_leaf_light(slot).reflected, all = even + sender_gloss_radiosity(sender_frame(), row);
+        by_lobe = mix(vec3(0.0), reflected / max(all, vec3(1e-30)), greaterThan(all, vec3(0.0)));
+        reflected = mix(reflected, even * by_lobe, greaterThan(all, vec3(0.0)));
     }
 
     Arrival none = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), slot);
@@ -129,6 +139,9 @@ Arrival arrival_of(uint node, uvec4 random, out float chance)
     SenderPoint point;
     if (!draw_point(leaf, receiver, sender_normal, u.xyz, lobe_draw, options.jitter, point)) return none;
     vec3 lost, light = reflected_light(leaf, receiver, sender_normal, options.clamp_radii, point, lost);
+    // As much evenly sent would be the same light here.
+    if (row != 0 && by_lobe != vec3(0.0))
+        reflected += PI * by_lobe * sender_gloss_radiance(sender_frame(), row, on_leaf_axes(leaf, sender_normal, -point.to / sqrt(dot(point.to, point.to))));
     vec3 target = receiver.position + point.to + end_offset() * sender_normal;
     return Arrival(light * emitted, light * reflected, lost * (emitted + reflected), target, slot);
 }

@@ -30,7 +30,8 @@ struct SenderNode {
     vec3 axis;          // unit: all normals lie within a cone about it
     float cos_cone;     // of the cone's half angle; -1 where they point everywhere
     uint skip;
-    float power;        // that leaves it in its brightest channel, W; radiant intensity along the normal is power / pi
+    float power;        // that would leave it in its brightest channel, W, if it sent evenly what it sends along its brightest
+                        // direction; no intensity is above power / pi times the cosine to the normal
 };
 
 // What compact nodes are quantised in.
@@ -39,12 +40,16 @@ struct SenderFrame {
     float largest_radius;   // metres
     vec3 extent;
     float largest_power;    // of the brightest channel of any node, W
+    uint gloss_first;       // texel of the leaves at which tables of shiny ones start
+    uint gloss_side;        // of their bins
 };
 
 const uint NO_SENDER = 0xffffffffu;
 
 // Texels of a node: centre | radius; axis (octahedral, 16 bits a coordinate), cos_cone, power of the brightest channel,
-// skip. Of its light: power; the part of it that is emitted, and the leaf that represents the node. Of its branch: the right
+// skip. Of its light: power, and what
+// is added to its brightest channel where lobes send more along their brightest direction; the part of it that is emitted,
+// and the leaf that represents the node. Of its branch: the right
 // child, and the left one's share of the power; of a leaf: NO_SENDER, and its index.
 const uint SENDER_NODE_TEXELS = 2;
 const uint SENDER_LIGHT_TEXELS = 2;
@@ -88,6 +93,13 @@ bool is_on_leaf(SenderLeaf leaf, vec3 point)
     vec2 at = sides_on_leaf(leaf, point);
     if (leaf.is_triangle != 0) return min(at.x, at.y) >= -1.0 / 3.0 && at.x + at.y <= 1.0 / 3.0;
     return max(abs(at.x), abs(at.y)) <= 0.5;
+}
+
+// A direction in the leaf's own axes: along its first side, across that, along its normal.
+vec3 on_leaf_axes(SenderLeaf leaf, vec3 normal, vec3 d)
+{
+    vec3 along = leaf.edge_u / sqrt(dot(leaf.edge_u, leaf.edge_u));
+    return vec3(dot(d, along), dot(d, cross(normal, along)), dot(d, normal));
 }
 
 // Corners counter-clockwise seen from the front; returns how many.

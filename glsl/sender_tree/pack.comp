@@ -16,13 +16,22 @@ uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 bool sender_is_compact() { return false; }
 SenderFrame sender_frame() { return tree_frame[0]; }
 
+// Its brightest channel is what the walk takes for the node's power.
+vec3 bounding_power(uint i)
+{
+    uvec4 light = sender_light_texel(SENDER_LIGHT_TEXELS * i);
+    vec3 power = uintBitsToFloat(light.xyz);
+    float brightest = max(power.r, max(power.g, power.b));
+    return brightest > 0.0 ? power * ((brightest + uintBitsToFloat(light.w)) / brightest) : power;
+}
+
 void main()
 {
     uint i = linear_index();
     if (i >= params.node_count) return;
 
     // No node has more than the root.
-    vec3 all = uintBitsToFloat(sender_light_texel(0).xyz);
+    vec3 all = bounding_power(0);
     float largest_power = max(all.r, max(all.g, all.b));
     if (i == 0) tree_frame[0].largest_power = largest_power;
 
@@ -42,6 +51,6 @@ void main()
     uint area_code = 0;     // the walk needs none: leaves have their own
     compact_nodes[i] = uvec4(place.x | place.y << 8 | place.z << 16 | radius_code << 24,
                              axis.x | axis.y << 8 | axis.z << 16 | cone_code << 24,
-                             pack_power(uintBitsToFloat(sender_light_texel(SENDER_LIGHT_TEXELS * i).xyz), largest_power) | area_code << 24,
+                             pack_power(bounding_power(i), largest_power) | area_code << 24,
                              node.skip | sender_leaf(i) << 16);
 }

@@ -32,8 +32,9 @@ void main()
         weight_left = node_areas[left];
         weight_right = node_areas[right];
     }
+    float beyond = uintBitsToFloat(sender_light[SENDER_LIGHT_TEXELS * left].w) + uintBitsToFloat(sender_light[SENDER_LIGHT_TEXELS * right].w);
     vec3 power = power_left + power_right, emitted = uintBitsToFloat(rest_left.xyz) + uintBitsToFloat(rest_right.xyz);
-    sender_light[SENDER_LIGHT_TEXELS * node] = uvec4(floatBitsToUint(power), 0u);
+    sender_light[SENDER_LIGHT_TEXELS * node] = uvec4(floatBitsToUint(power), floatBitsToUint(beyond));
     sender_light[SENDER_LIGHT_TEXELS * node + 1] = uvec4(floatBitsToUint(emitted), weight_left >= weight_right ? rest_left.w : rest_right.w);
-    node_texels[SENDER_NODE_TEXELS * node + 1].z = floatBitsToUint(max(power.r, max(power.g, power.b)));
+    node_texels[SENDER_NODE_TEXELS * node + 1].z = floatBitsToUint(max(power.r, max(power.g, power.b)) + beyond);
 }

@@ -22,6 +22,7 @@ pub mod punctual;
 pub mod quadtree;
 pub mod scan;
 pub mod sender_tree;
+pub mod shiny_texels;
 pub mod splats;
 pub mod surface_maps;
 pub mod texels;

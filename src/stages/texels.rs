@@ -1,5 +1,6 @@
 //! The atlas on the device: texels as receivers, what they reflect and emit, and their direct light.
 
+use super::shiny_texels::ShinyTexels;
 use super::trace::{self, Tracer};
 use super::world::World;
 use crate::gpu::shaders::atlas as passes;
@@ -78,7 +79,8 @@ impl Texels {
         recorder.dispatch(&pass, self.count);
     }
 
-    /// Adds punctual lights to `irradiance` (W/m2), by shadow rays from `samples` points of every texel.
+    /// Adds punctual lights to `irradiance` (W/m2), by shadow rays from `samples` points of every texel, and to the tables of
+    /// those that are `shiny`.
     pub fn add_lights(
         &self,
         recorder: &mut Recorder<'_>,
@@ -86,7 +88,9 @@ impl Texels {
         world: &World,
         samples: u32,
         irradiance: &Buffer<Vec3>,
+        shiny: Option<&ShinyTexels>,
     ) {
+        let shiny = shiny.filter(|shiny| shiny.row_count > 0);
         for light in 0..world.light_count {
             self.batches(samples, |first_texel, batch_count| {
                 let ray_count = batch_count * samples;
@@ -104,11 +108,18 @@ impl Texels {
                 let is_free = &self.is_free;
                 let pass = passes::LightIrradiance { texels, lights, rays, is_free, irradiance, params };
                 recorder.dispatch(&pass, batch_count);
+                if let Some(ShinyTexels { side, glossy_rows, arrived, .. }) = shiny {
+                    let (sample_count, side) = (samples, *side);
+                    let params = passes::LightGlossParams { first_texel, batch_count, sample_count, light, side };
+                    let pass = passes::LightGloss { texels, glossy_rows, lights, rays, is_free, arrived, params };
+                    recorder.dispatch(&pass, batch_count);
+                }
             });
         }
     }
 
-    /// Adds the environment to `irradiance` (W/m2), by `samples` rays of every texel.
+    /// Adds the environment to `irradiance` (W/m2), by `samples` rays of every texel, and to the tables of those that are
+    /// `shiny`.
     pub fn add_environment(
         &self,
         recorder: &mut Recorder<'_>,
@@ -116,7 +127,9 @@ impl Texels {
         world: &World,
         samples: u32,
         irradiance: &Buffer<Vec3>,
+        shiny: Option<&ShinyTexels>,
     ) {
+        let shiny = shiny.filter(|shiny| shiny.row_count > 0);
         let environment = &world.environment;
         if environment.info.is_black != 0 {
             return;
@@ -137,6 +150,19 @@ impl Texels {
                 params: passes::EnvironmentIrradianceParams { first_texel, batch_count, sample_count },
             };
             recorder.dispatch(&pass, batch_count);
+            if let Some(ShinyTexels { side, glossy_rows, arrived, .. }) = shiny {
+                let pass = passes::EnvironmentGloss {
+                    texels,
+                    glossy_rows,
+                    rays,
+                    is_free: &self.is_free,
+                    environment_info: &environment.info_buffer,
+                    environment_map: Sampled { image: &environment.map, sampler: &environment.sampler },
+                    arrived,
+                    params: passes::EnvironmentGlossParams { first_texel, batch_count, sample_count, side: *side },
+                };
+                recorder.dispatch(&pass, batch_count);
+            }
         });
     }
 

@@ -1,6 +1,7 @@
 //! What the GPU tests share: a context with validation on, whose silence is checked when it goes.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
+pub mod hemisphere_bins;
 pub mod lobe;
 pub mod posed;
 pub mod scenes;

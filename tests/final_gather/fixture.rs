@@ -6,6 +6,7 @@ use linklight::display::direct::Sample;
 use linklight::display::final_gather::{FinalGather, GatherReport, Gathered, Settings};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
+use linklight::gpu::Recorder;
 use linklight::gpu::shaders::types::SenderLeaf;
 use linklight::report::tonemap::ToneSettings;
 use linklight::scene::camera::{Lens, View};
@@ -72,16 +73,28 @@ impl Fixture {
     ) -> Gather {
         let tree = SenderTree::build(context, &self.leaves, settings.tree_options()).unwrap();
         let sent = [emitted, reflected].map(|values| context.upload("test/sent", values).unwrap());
+        self.gather_from(context, settings, &tree, samples, |recorder| tree.pull(recorder, &sent[0], &sent[1]))
+    }
+
+    /// ... from any tree, which `pull` fills.
+    pub fn gather_from(
+        &self,
+        context: &TestContext,
+        settings: Settings,
+        tree: &SenderTree,
+        samples: u32,
+        pull: impl FnOnce(&mut Recorder<'_>),
+    ) -> Gather {
         let shadow_maps = ShadowMaps::new(context, &self.pose).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
         let display = FinalGather::new(context, SIZE.to_array(), settings, ToneSettings::default(), self.seed).unwrap();
         let mut recorder = context.recorder("test").unwrap();
-        tree.pull(&mut recorder, &sent[0], &sent[1]);
+        pull(&mut recorder);
         shadow_maps.draw(&mut recorder, &self.world, &self.pose, self.bounds);
         let from = Gathered {
             world: &self.world,
-            tree: &tree,
+            tree,
             tracer: Tracer::compute(&self.bvh, &self.world),
             maps: None,
             bvh: &self.bvh,

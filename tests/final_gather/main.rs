@@ -8,5 +8,6 @@ mod gather;
 mod gloss;
 mod methods;
 mod pack;
+mod shiny;
 mod tree;
 mod twins;

@@ -31,7 +31,7 @@ fn texels_emit_and_reflect_as_plain_loops_do() {
         for is_indirect in [1, 0] {
             let pass = Reflect {
                 irradiance: &irradiance_buffer,
-                albedo: &albedo_buffer,
+                even_albedo: &albedo_buffer,
                 reflected: &reflected,
                 reflected_sum: &reflected_sum,
                 indirect: &indirect_sum,

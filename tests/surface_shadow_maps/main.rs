@@ -10,6 +10,7 @@ mod kernels;
 mod maps;
 mod moving;
 mod outside;
+mod shiny;
 mod solve;
 #[path = "../final_gather/twins.rs"]
 mod twins;

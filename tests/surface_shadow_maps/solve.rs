@@ -29,6 +29,8 @@ const SMALL: Settings = Settings {
     light_samples: 8,
     environment_rays: 64,
     glossy_bounce: true,
+    gloss_threshold: 0.1,
+    glossy_bins: 8,
     tree_layout: linklight::stages::sender_tree::NodeLayout::Wide,
     tree_normal_weight: 0.25,
     keep_maps: false,

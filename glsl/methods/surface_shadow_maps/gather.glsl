@@ -4,10 +4,11 @@
 // The kernel that includes this says how it sees, as in display/final_gather.glsl; bindings 0 to 6 and set 1 are its own.
 #include "lib/atlas.glsl"
 #include "lib/sender_gather.glsl"
+#include "lib/texel_gloss.glsl"
 
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 7, scalar) readonly buffer Texels { AtlasTexel texels[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Reflectance { vec3 reflectance[]; };
 layout(set = 0, binding = 9) uniform usamplerBuffer sender_nodes;       // SENDER_NODE_TEXELS each; compact: one
 layout(set = 0, binding = 10) uniform usamplerBuffer sender_light;      // SENDER_LIGHT_TEXELS each
 layout(set = 0, binding = 11) uniform usamplerBuffer sender_leaves;     // SENDER_LEAF_TEXELS each
@@ -16,6 +17,8 @@ layout(set = 0, binding = 13, scalar) readonly buffer Adaptation { float adaptat
 layout(set = 0, binding = 14, scalar) writeonly buffer Irradiance { vec3 irradiance[]; };
 layout(set = 0, binding = 15, scalar) writeonly buffer CutSizes { uint cut_sizes[]; };
 layout(set = 0, binding = 16, scalar) readonly buffer TreeFrames { SenderFrame tree_frame[]; };
+layout(set = 0, binding = 23, scalar) readonly buffer GlossyRows { uint glossy_rows[]; };   // of texels; 0: none
+layout(set = 0, binding = 24, scalar) buffer Arrived { vec3 arrived[]; };                   // by row and bin, W/m2
 layout(push_constant, scalar) uniform Params {
     uint texel_count;
     uint node_count;
@@ -49,11 +52,12 @@ void gather_texel()
     receiver = Receiver(texel.position, texel.normal, texel.normal, surface);
     slack = params.ray_offset;
     float scale = params.exposure * (params.key > 0.0 && adaptation[0] > 0.0 ? params.key / adaptation[0] : 1.0);
-    vec3 reflects = albedo[index];
+    vec3 reflects = reflectance[index];
     scale *= max(reflects.r, max(reflects.g, reflects.b));
     options = GatherOptions(params.threshold, scale, params.white, params.operator, 0.0, params.jitter != 0, 0u, params.chance_below);
     start_showing(0.0);
 
+    uint row = glossy_rows[index], side = sender_frame().gloss_side;
     vec3 origin = texel.position + params.ray_offset * texel.normal;
     vec3 sum = vec3(0.0);
     uint node = 0, visited = 0, cut = 0, most = 4;
@@ -73,6 +77,10 @@ void gather_texel()
             if (!found) break;
             vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);
             sum += light;
+            if (row != 0 && light != vec3(0.0)) {
+                vec2 u = unit_interval(pcg4d(uvec4(index, arrival.leaf, 6u, params.seed))).xy;
+                arrived[arrival_entry(texel, row, side, normalize(arrival.target - texel.position), u)] += PI * light;
+            }
             start_showing(shown_luminance + luminance(light));
         }
     }

@@ -4,7 +4,8 @@
 #include "lib/sender_maps.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
-// reads texels, albedo, the sender tree, the maps   writes irradiance (W/m2), cut_sizes [texel_count]   shared none
+// reads texels, reflectance, the sender tree, the maps
+// writes irradiance (W/m2), cut_sizes [texel_count]   updates arrived of shiny texels   shared none
 layout(set = 0, binding = 0) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 1) uniform usamplerBuffer runs;
 layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };       // by place

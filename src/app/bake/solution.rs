@@ -106,7 +106,7 @@ impl ElementLight {
         let punctual = context.buffer("bake/punctual", texels.count as usize)?;
         recorder.fill(&punctual, 0);
         let samples = method.settings().light_samples;
-        texels.add_lights(&mut recorder, &stage.tracer(), &stage.world, samples, &punctual);
+        texels.add_lights(&mut recorder, &stage.tracer(), &stage.world, samples, &punctual, None);
         recorder.submit()?;
         let direct = sum(&[context.download(&punctual)?, context.download(method.direct_irradiance())?]);
         let indirect = context.download(method.indirect_irradiance())?;

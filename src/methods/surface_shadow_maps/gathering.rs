@@ -10,6 +10,7 @@ impl SurfaceShadowMaps {
     /// Refine and gather for all texels in one walk each.                          [Ritschel2008 4.3, Fig. 10]
     pub(super) fn gather(&self, recorder: &mut Recorder<'_>, lit: &Lit<'_>, bounce: u32) {
         let (texels, tree, s) = (&self.texels, &self.tree, &self.state);
+        self.gloss.shiny.clear(recorder);
         let (operator, key) = match self.tone.operator {
             Operator::Reinhard => (0, self.tone.key),
             Operator::Filmic => (1, self.tone.key),
@@ -21,7 +22,9 @@ impl SurfaceShadowMaps {
                 let pass = passes::$pass {
                     $($field: $value,)*
                     texels: &texels.texels,
-                    albedo: &texels.albedo,
+                    reflectance: &self.gloss.reflectance,
+                    glossy_rows: &self.gloss.shiny.glossy_rows,
+                    arrived: &self.gloss.shiny.arrived,
                     sender_nodes: nodes,
                     sender_light: &tree.light,
                     sender_leaves: &tree.leaves,

@@ -17,10 +17,10 @@
 //! **Per frame without new maps:** lights, emission, albedo, environment, objects that move rigidly
 //! ([`SurfaceShadowMaps::place`]). **With new maps:** surfaces that bend or scale.
 //!
-//! **What it does not carry:** what texels send each other by their specular lobes. A texel sends evenly what it reflects
-//! diffusely, and metal so sends nothing: the tree holds how much light arrived at a texel, not from where. A box with
-//! walls of metal keeps 94 % of its light; sending the lobe's share evenly made it 112 %, and worse pictures. The last
-//! bounce, towards the eye, has its lobe: at pixels, and at the texels of the lightmap.
+//! **Shiny texels** send their lobes' light by direction, along bins over their hemispheres ([`Settings::glossy_bins`]): no
+//! lobe between texels is narrower than a bin, and what mirrors throw on walls is blurred so far. Texels below
+//! [`Settings::gloss_threshold`] send evenly what both lobes reflect. The last bounce, towards the eye, has the exact lobe:
+//! at pixels, and at the texels of the lightmap.
 //!
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
@@ -30,6 +30,7 @@
 //! [Ritschel2008]: crate::methods::PAPERS
 
 mod gathering;
+mod gloss;
 mod moving;
 mod views;
 
@@ -46,6 +47,7 @@ use crate::scene::pose::Pose;
 use crate::stages::bvh::{Bvh, BvhError};
 use crate::stages::hidden_parts::{self, HiddenPartsError, Seen};
 use crate::stages::sender_tree::{NodeLayout, SenderTree, SenderTreeError, TreeOptions};
+use crate::stages::shiny_texels::{ShinyTexels, ShinyTexelsError};
 use crate::stages::surface_maps::{
     self, MapFilter, MapInput, MapOptions, MapUntil, PlacedMaps, Sequence, SurfaceMapError, SurfaceMaps, map_offset,
     texel_objects,
@@ -55,6 +57,7 @@ use crate::stages::trace::Tracer;
 use crate::stages::work::Watch;
 use crate::stages::world::World;
 use glam::Vec3;
+use gloss::{Filled, Gloss};
 use moving::{Apart, Rest};
 use serde::Serialize;
 use std::path::Path;
@@ -106,6 +109,10 @@ crate::settings! {
         /// Shown by the lightmap, texels that shine gather a bounce of their own towards the eye; else they reflect as if light
         /// came evenly from all sides.
         glossy_bounce: bool = true, paper "Fig. 17";
+        /// Texels whose lobes reflect this share of even light, and more, send it by direction; others evenly.
+        gloss_threshold: f32 = 0.1, range 0.0..=2.0, paper "all texels send evenly";
+        /// Bins a side of the hemisphere of a texel that sends by direction, no lobe narrower than one; 0: all send evenly.
+        glossy_bins: u32 = 8, range 0..=16, unit "bins", paper "none; future work";
         /// How nodes of the tree lie in memory.
         tree_layout: NodeLayout = NodeLayout::Wide, paper "compact";
         /// How much a difference of normals counts beside distance when the tree is cut.
@@ -128,6 +135,8 @@ pub enum SurfaceShadowMapsError {
     HiddenParts(#[from] HiddenPartsError),
     #[error(transparent)]
     Tree(#[from] SenderTreeError),
+    #[error(transparent)]
+    Shiny(#[from] ShinyTexelsError),
     #[error(transparent)]
     Maps(#[from] SurfaceMapError),
     #[error(transparent)]
@@ -180,6 +189,7 @@ pub struct SurfaceShadowMaps {
     pub texels: Texels,
     pub tree: SenderTree,
     pub maps: Option<PlacedMaps>,
+    gloss: Gloss,
     rest: Option<Rest>,
     tone: ToneSettings,
     seed: u32,
@@ -252,7 +262,10 @@ impl SurfaceShadowMaps {
         let seen = Seen { tracers: &tracers, triangle_objects, ray_offset };
         hidden_parts::leave_out(context, &seen, stage.geometry, positions, &mut atlas, stage.watch)?;
         let texels = Texels::new(context, &atlas, stage.world, ray_offset)?;
-        let tree = SenderTree::build(context, &texels::leaves(&atlas), settings.tree_options())?;
+        let shiny = [settings.glossy_bins as f32, settings.gloss_threshold];
+        let gloss = Gloss::new(context, ShinyTexels::find(context, &texels, &atlas, shiny)?)?;
+        let options = settings.tree_options();
+        let tree = SenderTree::with_shiny(context, &texels::leaves(&atlas), gloss.shiny.as_leaves(), options)?;
         let maps = match settings.visibility {
             TexelVisibility::Maps => {
                 Some(make_maps(context, &Stage { bounds, ..*stage }, &atlas, &tree, &settings, apart.as_ref())?)
@@ -262,7 +275,7 @@ impl SurfaceShadowMaps {
         let state = State::new(context, texels.count as usize)?;
         let rest = apart.is_some().then(|| Rest::of(stage, &atlas));
         let (tone, seed) = (stage.tone, stage.seed);
-        let mut method = Self { settings, atlas, texels, tree, maps, rest, tone, seed, state };
+        let mut method = Self { settings, atlas, texels, tree, maps, gloss, rest, tone, seed, state };
         method.place(context, stage)?;
         Ok(method)
     }
@@ -281,33 +294,36 @@ impl SurfaceShadowMaps {
             params: passes::EmitParams { texel_count: texels.count },
         };
         recorder.dispatch(&pass, texels.count);
+        self.gloss.begin(recorder, texels);
+        let shiny = Some(&self.gloss.shiny);
         recorder.scope("direct", |recorder| {
-            self.tree.pull(recorder, &s.emitted, &s.dark);
+            self.fill(recorder, Filled::Emitted);
             self.gather(recorder, &lit, 0);
-            texels.add_environment(recorder, &tracer, world, self.settings.environment_rays, &s.irradiance);
+            texels.add_environment(recorder, &tracer, world, self.settings.environment_rays, &s.irradiance, shiny);
             recorder.copy(&s.irradiance, &s.direct);
-            texels.add_lights(recorder, &tracer, world, self.settings.light_samples, &s.irradiance);
+            texels.add_lights(recorder, &tracer, world, self.settings.light_samples, &s.irradiance, shiny);
             self.reflect(recorder, false);
         });
         for bounce in 1..=bounces {
             recorder.scope(format_args!("bounce {bounce}"), |recorder| {
-                self.tree.pull(recorder, &s.dark, &s.reflected);
+                self.fill(recorder, Filled::Bounce);
                 recorder.copy(&s.reflected_sum, &s.sent_before);
+                self.gloss.keep_sum(recorder);
                 self.gather(recorder, &lit, bounce);
                 self.reflect(recorder, true);
             });
         }
-        self.tree.pull(recorder, &s.emitted, &s.reflected_sum);
+        self.fill(recorder, Filled::All);
     }
 
     /// Fills the tree with what the texels' own irradiance came from: for a last bounce of theirs towards the eye.
     pub fn send_before_last(&self, recorder: &mut Recorder<'_>) {
-        self.tree.pull(recorder, &self.state.emitted, &self.state.sent_before);
+        self.fill(recorder, Filled::BeforeLast);
     }
 
     /// Fills the tree with what emits alone: what is shown without bounces.
     pub fn emit_only(&self, recorder: &mut Recorder<'_>) {
-        self.tree.pull(recorder, &self.state.emitted, &self.state.dark);
+        self.fill(recorder, Filled::Emitted);
     }
 
     /// What arrived leaves again, and is kept.
@@ -315,13 +331,14 @@ impl SurfaceShadowMaps {
         let s = &self.state;
         let pass = passes::Reflect {
             irradiance: &s.irradiance,
-            albedo: &self.texels.albedo,
+            even_albedo: &self.gloss.even_albedo,
             reflected: &s.reflected,
             reflected_sum: &s.reflected_sum,
             indirect: &s.indirect,
             params: passes::ReflectParams { texel_count: self.texels.count, is_indirect: u32::from(is_indirect) },
         };
         recorder.dispatch(&pass, self.texels.count);
+        self.gloss.reflect(recorder, &self.texels);
     }
 
     /// Of the last bounce alone, W/m2 per texel.

@@ -86,7 +86,9 @@ impl SurfaceShadowMaps {
         let of_texel = |texel: usize| world_from_rest[moving.texel_objects[texel] as usize];
         self.atlas = rest.atlas.moved(of_texel);
         self.texels.move_to(context, &self.atlas)?;
-        self.tree = SenderTree::build(context, &texels::leaves(&self.atlas), self.settings.tree_options())?;
+        let options = self.settings.tree_options();
+        self.tree =
+            SenderTree::with_shiny(context, &texels::leaves(&self.atlas), self.gloss.shiny.as_leaves(), options)?;
         let leaf_order = &self.tree.topology.leaf_order;
         let before = std::mem::take(&mut moving.overlaps);
         moving.place(context, &rest.atlas, leaf_order, &world_from_rest)?;
