@@ -34,6 +34,21 @@ struct AtlasPart {
     float area;         // m2
 };
 
+// A part as a triangle of about its area.
+struct PartShape {
+    vec3 centre;        // metres
+    float until;        // share of the texel's area that this part and those before it have, 0..1
+    vec3 edge_u;
+    vec3 edge_v;
+};
+
+// The point `u` (0..1 twice) of a part, areas in proportion.
+vec3 part_point(PartShape part, vec2 u)
+{
+    if (u.x + u.y > 1.0) u = 1.0 - u;
+    return part.centre + (u.x - 1.0 / 3.0) * part.edge_u + (u.y - 1.0 / 3.0) * part.edge_v;
+}
+
 // Where a triangle's corners lie in the atlas, texels.
 struct TriangleCorners {
     vec2 a;

@@ -4,7 +4,7 @@ use super::shiny_texels::ShinyTexels;
 use super::trace::{self, Tracer};
 use super::world::World;
 use crate::gpu::shaders::atlas as passes;
-use crate::gpu::shaders::types::{AtlasPart, AtlasTexel, Ray, SenderLeaf, TexelGloss};
+use crate::gpu::shaders::types::{AtlasPart, AtlasTexel, PartShape, Ray, SenderLeaf, TexelGloss};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::scene::atlas::Atlas;
 use crate::stages::sender_tree::parallelogram;
@@ -26,6 +26,8 @@ pub struct Texels {
     /// How far rays start off their surface, metres.
     pub ray_offset: f32,
     pub parts: Buffer<AtlasPart>,
+    /// Where the parts lie, one each.
+    pub shapes: Buffer<PartShape>,
     rays: Buffer<Ray>,
     is_free: Buffer<u32>,
 }
@@ -46,6 +48,7 @@ impl Texels {
             gloss: context.buffer("texels/gloss", count)?,
             ray_offset,
             parts: context.upload("texels/parts", &parts)?,
+            shapes: context.buffer("texels/shapes", parts.len())?,
             rays: context.buffer("texels/rays", BATCH_RAYS as usize)?,
             is_free: context.buffer("texels/is free", BATCH_RAYS as usize)?,
         };
@@ -75,6 +78,19 @@ impl Texels {
             gloss: &self.gloss,
             textures: &world.textures,
             params: passes::MaterialsParams { texel_count: self.count },
+        };
+        recorder.dispatch(&pass, self.count);
+    }
+
+    /// Takes over where the world's triangles are now.
+    pub fn update_shapes(&self, recorder: &mut Recorder<'_>, world: &World) {
+        let pass = passes::PartShapes {
+            texels: &self.texels,
+            parts: &self.parts,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            shapes: &self.shapes,
+            params: passes::PartShapesParams { texel_count: self.count },
         };
         recorder.dispatch(&pass, self.count);
     }

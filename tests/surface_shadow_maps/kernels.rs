@@ -1,12 +1,15 @@
 //! Kernels of the maps and of the solution against plain loops, each shown to tell a wrong result.
 
 use crate::common::{Random, TestContext};
+use crate::fixture::{Fixture, builtin_scene};
 use glam::{Vec2, Vec3};
 use linklight::gpu::shaders::methods::surface_shadow_maps::{Emit, EmitParams, Reflect, ReflectParams};
 use linklight::gpu::shaders::surface_maps::{
     CubeRays, CubeRaysParams, Intervals, IntervalsParams, SecondRays, SecondRaysParams,
 };
 use linklight::gpu::shaders::types::{Hit, Ray};
+use linklight::scene::environment::Environment;
+use linklight::stages::texels::Texels;
 use linklight::stages::trace::NO_HIT;
 use std::f32::consts::PI;
 
@@ -52,6 +55,46 @@ fn texels_emit_and_reflect_as_plain_loops_do() {
             assert!(!near(sum[i], before[i] + once + 1e-3));
         }
     }
+}
+
+/// Points that texels receive at lie on their own surface: each part's triangle has its centroid, the sides of the scene's
+/// triangle made smaller, and its area where that fits.
+#[test]
+fn shapes_of_parts_are_their_triangles_made_smaller() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
+    let atlas = fixture.atlas(24);
+    let texels = Texels::new(&context, &atlas, &fixture.world, 1e-3).unwrap();
+    let mut recorder = context.recorder("test").unwrap();
+    texels.update_shapes(&mut recorder, &fixture.world);
+    recorder.submit().unwrap();
+    let shapes = context.download(&texels.shapes).unwrap();
+    let (points, _) = atlas.part_points(&fixture.geometry, &fixture.positions);
+    let (mut cut, mut full) = (0, 0);
+    for (index, texel) in atlas.texels.iter().enumerate() {
+        let parts = atlas.parts_of(index);
+        let all: f32 = parts.iter().map(|part| part.area).sum();
+        let mut until = 0.0;
+        for (part, k) in parts.iter().zip(texel.first_part as usize..) {
+            let [a, b, c] = fixture.geometry.triangles[part.triangle as usize].map(|v| fixture.positions[v as usize]);
+            let (shape, area) = (shapes[k], 0.5 * (b - a).cross(c - a).length());
+            until += part.area / all;
+            assert!(shape.centre.distance(points[k]) < 1e-5 && (shape.until - until).abs() < 1e-5, "part {k}");
+            let [x, y] = part.barycentrics.to_array();
+            let (ratio, most) = ((part.area / area).sqrt(), 3.0 * x.min(y).min(1.0 - x - y));
+            let ratio = ratio.min(most);
+            // All three corners lie on the triangle, up to rounding.
+            for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)] {
+                let at = [x + (u - 1.0 / 3.0) * ratio, y + (v - 1.0 / 3.0) * ratio];
+                assert!(at[0] > -1e-5 && at[1] > -1e-5 && at[0] + at[1] < 1.0 + 1e-5, "part {k}: {at:?}");
+            }
+            full += u32::from(ratio < most);
+            assert!(shape.edge_u.distance(ratio * (b - a)) < 1e-4 && shape.edge_v.distance(ratio * (c - a)) < 1e-4);
+            cut += u32::from(ratio < 0.9);
+        }
+    }
+    assert!(full > 100, "{full} parts keep their area");
+    assert!(cut > 100, "whole triangles alone would tell nothing of the scale");
 }
 
 /// Through the middle of a pixel.

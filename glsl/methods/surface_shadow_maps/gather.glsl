@@ -19,6 +19,7 @@ layout(set = 0, binding = 15, scalar) writeonly buffer CutSizes { uint cut_sizes
 layout(set = 0, binding = 16, scalar) readonly buffer TreeFrames { SenderFrame tree_frame[]; };
 layout(set = 0, binding = 23, scalar) readonly buffer GlossyRows { uint glossy_rows[]; };   // of texels; 0: none
 layout(set = 0, binding = 24, scalar) buffer Arrived { vec3 arrived[]; };                   // by row and bin, W/m2
+layout(set = 0, binding = 25, scalar) readonly buffer Shapes { PartShape shapes[]; };
 layout(push_constant, scalar) uniform Params {
     uint texel_count;
     uint node_count;
@@ -40,6 +41,14 @@ uvec4 sender_node_texel(uint i) { return texelFetch(sender_nodes, int(i)); }
 uvec4 sender_light_texel(uint i) { return texelFetch(sender_light, int(i)); }
 uvec4 sender_leaf_texel(uint i) { return texelFetch(sender_leaves, int(i)); }
 uvec4 sender_branch_texel(uint i) { return texelFetch(sender_branches, int(i)); }
+
+// A point drawn on the texel's own surface: a large texel may lie half in the shade.
+vec3 drawn_origin(AtlasTexel texel, vec4 u)
+{
+    uint part = texel.first_part, last = texel.first_part + texel.part_count - 1;
+    while (part < last && shapes[part].until < u.z) ++part;
+    return part_point(shapes[part], u.xy) + params.ray_offset * texel.normal;
+}
 
 void gather_texel()
 {
@@ -75,6 +84,7 @@ void gather_texel()
                 found = is_worth_asking(arrival, chance);
             }
             if (!found) break;
+            if (options.jitter) origin = drawn_origin(texel, unit_interval(pcg4d(uvec4(index, arrival.leaf, 7u, params.seed))));
             vec3 light = visibility(origin, arrival.target, arrival.leaf) * (arrival.direct + arrival.indirect);
             sum += light;
             if (row != 0 && light != vec3(0.0)) {

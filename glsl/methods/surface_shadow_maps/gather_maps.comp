@@ -4,7 +4,7 @@
 #include "lib/sender_maps.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the senders' maps.      [Ritschel2008 4.3]
-// reads texels, reflectance, the sender tree, the maps
+// reads texels, shapes, reflectance, the sender tree, the maps
 // writes irradiance (W/m2), cut_sizes [texel_count]   updates arrived of shiny texels   shared none
 layout(set = 0, binding = 0) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 1) uniform usamplerBuffer runs;

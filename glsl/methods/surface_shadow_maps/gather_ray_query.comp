@@ -6,7 +6,7 @@
 #include "trace/holes.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by the driver's traversal.  [Ritschel2008 4.3]
-// reads texels, reflectance, the sender tree, the acceleration structure and what tells holes
+// reads texels, shapes, reflectance, the sender tree, the acceleration structure and what tells holes
 // writes irradiance (W/m2), cut_sizes [texel_count]   updates arrived of shiny texels   shared none
 layout(set = 0, binding = 0) uniform accelerationStructureEXT acceleration_structure;
 

@@ -5,7 +5,7 @@
 #include "trace/holes.glsl"
 
 // One thread per texel: what it receives from the sender tree, seeing by our own traversal.      [Ritschel2008 4.3]
-// reads texels, reflectance, the sender tree, the hierarchy and what tells its holes
+// reads texels, shapes, reflectance, the sender tree, the hierarchy and what tells its holes
 // writes irradiance (W/m2), cut_sizes [texel_count]   updates arrived of shiny texels   shared none
 layout(set = 0, binding = 0) uniform usamplerBuffer bvh_nodes;     // NODE_TEXELS each
 layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_TEXELS each, in leaf order

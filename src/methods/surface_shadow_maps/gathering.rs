@@ -25,6 +25,7 @@ impl SurfaceShadowMaps {
                     reflectance: &self.gloss.reflectance,
                     glossy_rows: &self.gloss.shiny.glossy_rows,
                     arrived: &self.gloss.shiny.arrived,
+                    shapes: &texels.shapes,
                     sender_nodes: nodes,
                     sender_light: &tree.light,
                     sender_leaves: &tree.leaves,

@@ -294,6 +294,7 @@ impl SurfaceShadowMaps {
             params: passes::EmitParams { texel_count: texels.count },
         };
         recorder.dispatch(&pass, texels.count);
+        texels.update_shapes(recorder, world);
         self.gloss.begin(recorder, texels);
         let shiny = Some(&self.gloss.shiny);
         recorder.scope("direct", |recorder| {
