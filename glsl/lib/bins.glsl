@@ -3,6 +3,7 @@
 // Direction bins: the texels of a cube map of n x n texels a face, about a receiver.                 [Dong2007 4.2.2]
 // Faces +x, -x, +y, -y, +z, -z; within a face u runs along the axis after its own and v along the one after that.
 
+const uint FACE_OF_Z = 4;               // its own axes are x, y, z
 const uint EMPTY_BIN = 0xffffffffu;     // of a winner: nothing is seen
 const uint BACK_SEEN = 0x80000000u;     // of a winner: it turns its back
 const uint NODE_MASK = 0x7fffffffu;
@@ -71,6 +72,14 @@ vec3 in_face(uint face, vec3 d)
     return axis == 0 ? vec3(d.yz, side * d.x) : axis == 1 ? vec3(d.z, d.x, side * d.y) : vec3(d.xy, side * d.z);
 }
 
+// And back.
+vec3 from_face(uint face, vec3 at)
+{
+    float along = (face & 1) == 0 ? at.z : -at.z;
+    uint axis = face >> 1;
+    return axis == 0 ? vec3(along, at.xy) : axis == 1 ? vec3(at.y, along, at.x) : vec3(at.xy, along);
+}
+
 uint face_of(vec3 d)
 {
     vec3 a = abs(d);
@@ -94,6 +103,13 @@ uint bin_of(vec3 d, uint n)
 
 // Place in -1..1 of a cell's centre.
 float cell_centre(uint cell, uint n) { return (2.0 * float(cell) + 1.0) / float(n) - 1.0; }
+
+// Whether all of a bin lies below the plane across a normal; `uv` is its centre's place in -1..1 of the face.
+bool is_below(uint face, vec2 uv, vec3 normal, uint n)
+{
+    vec3 up = in_face(face, normal);
+    return dot(uv, up.xy) + up.z + (abs(up.x) + abs(up.y)) / float(n) <= 0.0;
+}
 
 // Towards the centre of a bin, not of unit length.
 vec3 bin_direction(uint bin, uint n)

@@ -25,13 +25,23 @@ fn winners_are_the_nearest_of_a_leaf_and_what_is_above() {
         let own = &window.plan.levels[level];
         keys[(own.row + node - own.first) as usize * bin_count + bin]
     };
-    let mut from_above = 0;
+    let receivers = context.download(&method.linking().receivers).unwrap();
+    let (mut from_above, mut below) = (0, 0);
     for (leaf, row) in rows.iter().enumerate() {
         for (bin, &winner) in row.iter().enumerate() {
             let own = key(0, leaf as u32, bin);
             let above = trees.parent(leaf as u32).map_or(EMPTY_KEY, |parent| key(1, parent, bin));
             from_above += usize::from(above < own);
-            assert_eq!(winner, own.min(above) as u32, "leaf {leaf}, bin {bin}");
+            // A bin's corners tell whether all of it lies below the horizon.
+            let at = |cell: u32, corner: u32| 2.0 * f64::from(cell + corner) / f64::from(settings.bins) - 1.0;
+            let (n, bin) = (settings.bins, bin as u32);
+            let corner = |k: u32| bins::face_direction(bin / (n * n), at(bin % n, k & 1), at(bin / n % n, k >> 1));
+            let highest = (0..4).map(|k| corner(k).as_vec3().dot(receivers[leaf].normal)).fold(f32::MIN, f32::max);
+            if highest.abs() > 1e-5 {
+                let expected = if highest > 0.0 { own.min(above) as u32 } else { twins::EMPTY };
+                assert_eq!(winner, expected, "leaf {leaf}, bin {bin}");
+                below += usize::from(highest < 0.0);
+            }
         }
     }
     for level in 1..trees.levels.len() {
@@ -42,7 +52,7 @@ fn winners_are_the_nearest_of_a_leaf_and_what_is_above() {
             }
         }
     }
-    assert!(from_above > 1000, "{from_above} links come from above");
+    assert!(from_above > 1000 && below > 1000, "{from_above} links come from above, {below} bins lie below");
 }
 
 /// Where leaves receive: the origin of their rays, their normal, and the turn of their bins.

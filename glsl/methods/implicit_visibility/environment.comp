@@ -33,15 +33,20 @@ void main()
     EnvironmentInfo env = environment_info[0];
     vec3 sum = vec3(0.0);
     float total = 0.0;
-    for (uint bin = 0; bin < 6 * params.n * params.n; ++bin) {
-        float weight = dot(bin_vectors[bin], normal);
-        if (weight <= 0.0) continue;
-        total += weight;
-        if (winners[bin * params.leaf_count + local] != EMPTY_BIN) continue;
-        vec3 radiance = params.is_turned == 0
-                            ? bin_radiance[bin]
-                            : environment_radiance(env, turn(at.frame, normalize(bin_direction(bin, params.n))));
-        sum += weight * radiance;
+    uint per_face = params.n * params.n;
+    for (uint cell = 0; cell < per_face; ++cell) {
+        vec3 in_axes = bin_vectors[FACE_OF_Z * per_face + cell];    // of all faces
+        for (uint face = 0; face < 6; ++face) {
+            uint bin = face * per_face + cell;
+            float weight = dot(from_face(face, in_axes), normal);
+            if (weight <= 0.0) continue;
+            total += weight;
+            if (winners[bin * params.leaf_count + local] != EMPTY_BIN) continue;
+            vec3 radiance = params.is_turned == 0
+                                ? bin_radiance[bin]
+                                : environment_radiance(env, turn(at.frame, normalize(bin_direction(bin, params.n))));
+            sum += weight * radiance;
+        }
     }
     irradiance[leaf_elements[params.first_leaf + local]] = total > 0.0 ? sum * (PI / total) : vec3(0.0);
 }

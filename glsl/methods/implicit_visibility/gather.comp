@@ -37,6 +37,26 @@ layout(constant_id = 2) const uint TABLE_SIDE = 0;
 
 const float PI = 3.14159265358979;
 
+// From the winner of a bin: radiosity times its weight, W/m2.
+vec3 received(uint local, Receiver at, uint bin, vec3 vector, float weight)
+{
+    uint winner = winners[bin * params.leaf_count + local];
+    bool is_link = OF_EMITTERS == 0 || (light_bins[bin / 32 * params.leaf_count + local] >> bin % 32 & 1) != 0;
+    if (winner >= BACK_SEEN || !is_link) return vec3(0.0);
+    vec3 sent = node_radiosity[winner];
+    if (TRANSPORT != BY_BINS) {
+        Surfel s = surfels[winner];
+        vec3 offset = s.centre - at.origin;
+        float squared = dot(offset, offset);
+        float solid_angle = s.area * max(dot(s.normal, -offset), 0.0) / (squared * sqrt(squared));
+        if (TRANSPORT == BY_DISCS) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
+        else weight *= min(1.0, solid_angle / length(vector));
+    }
+    if (TABLE_SIDE != 0 && glossy_of_node[winner] != EMPTY_BIN)
+        sent += PI * specular[glossy_of_node[winner] * 6 * TABLE_SIDE * TABLE_SIDE + bin_of(-turn(at.frame, vector), TABLE_SIDE)];
+    return weight * sent;
+}
+
 void main()
 {
     uint local = linear_index();
@@ -45,25 +65,14 @@ void main()
     vec3 normal = turn_back(at.frame, at.normal);
     vec3 sum = vec3(0.0);
     float total = 0.0;
-    for (uint bin = 0; bin < params.bin_count; ++bin) {
-        float weight = max(dot(bin_vectors[bin], normal), 0.0);
-        total += weight;
-        uint winner = winners[bin * params.leaf_count + local];
-        bool is_link = OF_EMITTERS == 0 || (light_bins[bin / 32 * params.leaf_count + local] >> bin % 32 & 1) != 0;
-        if (weight > 0.0 && winner < BACK_SEEN && is_link) {
-            vec3 sent = node_radiosity[winner];
-            if (TRANSPORT != BY_BINS) {
-                Surfel s = surfels[winner];
-                vec3 offset = s.centre - at.origin;
-                float squared = dot(offset, offset);
-                float solid_angle = s.area * max(dot(s.normal, -offset), 0.0) / (squared * sqrt(squared));
-                if (TRANSPORT == BY_DISCS) weight = solid_angle * max(dot(at.normal, offset), 0.0) / sqrt(squared);
-                else weight *= min(1.0, solid_angle / length(bin_vectors[bin]));
-            }
-            if (TABLE_SIDE != 0 && glossy_of_node[winner] != EMPTY_BIN)
-                sent += PI * specular[glossy_of_node[winner] * 6 * TABLE_SIDE * TABLE_SIDE
-                                      + bin_of(-turn(at.frame, bin_vectors[bin]), TABLE_SIDE)];
-            sum += weight * sent;
+    uint per_face = params.bin_count / 6;
+    for (uint cell = 0; cell < per_face; ++cell) {
+        vec3 in_axes = bin_vectors[FACE_OF_Z * per_face + cell];    // of all faces
+        for (uint face = 0; face < 6; ++face) {
+            vec3 vector = from_face(face, in_axes);
+            float weight = max(dot(vector, normal), 0.0);
+            total += weight;
+            if (weight > 0.0) sum += received(local, at, face * per_face + cell, vector, weight);
         }
     }
     irradiance[leaf_elements[params.first_leaf + local]] = sum / (TRANSPORT == BY_DISCS ? PI : max(total, 1e-20));

@@ -7,8 +7,8 @@
 // One thread per leaf of a window and row of bins on a face: the last step of the sweep, and the winner alone for the light. A bin
 // above the horizon that nothing fills between filled ones is a hole in the cover of surfels, not a view of the
 // environment: it takes the farthest of its neighbours.                                      [Dong2007 4.2.3, 4.2.4]
-// reads node_segments, segments, window_levels, receivers[leaf_count], keys   writes winners[6 n n * window leaves],
-// bin after bin   shared none
+// reads node_segments, segments, window_levels, receivers[leaf_count], keys   updates winners[6 n n * window leaves],
+// bin after bin (empty before: bins below the horizon stay so)   shared none
 // Differs from [Dong2007]: holes are filled.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer NodeSegments { uint node_segments[]; };
@@ -80,9 +80,10 @@ void main()
     // At most 64 bins; those that are empty come second, together: few are, and only there is much to do.
     uvec2 empty = uvec2(0);
     for (uint k = 0; k < params.n; ++k) {
+        vec2 uv = vec2(cell_centre(k, params.n), cell_centre(row, params.n));
+        if (is_below(face, uv, normal, params.n)) continue;
         uint64_t key = key_of(first_bin + k);
         winners[(first_bin + k) * own.count + local] = unpackUint2x32(key).x;       // of NO_KEY: EMPTY_BIN
-        vec2 uv = vec2(cell_centre(k, params.n), cell_centre(row, params.n));
         bool is_seen = dot(face_direction(face, uv), normal) > 0.0;
         uint bit = key == NO_KEY && is_seen ? params.fills_holes << (k & 31) : 0u;
         empty |= k < 32 ? uvec2(bit, 0) : uvec2(0, bit);

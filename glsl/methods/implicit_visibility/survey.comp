@@ -4,7 +4,7 @@
 
 // One thread per leaf of a window: how much of what it sees turns its back, in thousandths of the cosine-weighted
 // hemisphere (an element that sees mostly backs stands inside something), how many links it kept, and the list of its
-// light links: the bins whose winners emit.                                                        [Dong2007 4.4]
+// light links, where anything emits along links: the bins whose winners do.                                                        [Dong2007 4.4]
 // reads winners[6 n n * leaf_count of the window], receivers, leaf_elements, bin_vectors[6 n n] (sr), node_radiosity: emitted, [node_count]
 // writes outcomes[element_count], light_bins[ceil(6 n n / 32) * leaf_count of the window] (bits)   updates link_counts
 // shared none
@@ -26,16 +26,23 @@ void main()
     Receiver at = receivers[params.first_leaf + local];
     vec3 normal = turn_back(at.frame, at.normal);
     float backs = 0.0, total = 0.0;
-    uint kept = 0, lights = 0;
-    for (uint bin = 0; bin < params.bin_count; ++bin) {
-        float weight = max(dot(bin_vectors[bin], normal), 0.0);
-        uint winner = winners[bin * params.leaf_count + local];
-        total += weight;
-        if (winner != EMPTY_BIN && weight > 0.0) {
-            ++kept;
-            if ((winner & BACK_SEEN) != 0) backs += weight;
-            else if (params.has_emitters != 0 && node_radiosity[winner] != vec3(0.0)) lights |= 1u << bin % 32;
+    uint kept = 0, per_face = params.bin_count / 6;
+    for (uint cell = 0; cell < per_face; ++cell) {
+        vec3 in_axes = bin_vectors[FACE_OF_Z * per_face + cell];    // of all faces
+        for (uint face = 0; face < 6; ++face) {
+            float weight = max(dot(from_face(face, in_axes), normal), 0.0);
+            total += weight;
+            if (weight <= 0.0) continue;
+            uint winner = winners[(face * per_face + cell) * params.leaf_count + local];
+            kept += winner != EMPTY_BIN ? 1 : 0;
+            backs += winner != EMPTY_BIN && (winner & BACK_SEEN) != 0 ? weight : 0.0;
         }
+    }
+    uint lights = 0;
+    for (uint bin = 0; bin < params.bin_count && params.has_emitters != 0; ++bin) {
+        uint winner = winners[bin * params.leaf_count + local];
+        bool is_light = dot(bin_vectors[bin], normal) > 0.0 && winner < BACK_SEEN && node_radiosity[winner] != vec3(0.0);
+        lights |= is_light ? 1u << bin % 32 : 0u;
         if (bin % 32 == 31 || bin + 1 == params.bin_count) {
             light_bins[bin / 32 * params.leaf_count + local] = lights;
             lights = 0;

@@ -309,6 +309,7 @@ impl Linking {
             };
             recorder.dispatch(&pass, window.plan.levels[level].count as usize * PUSHERS);
         }
+        recorder.fill(&window.winners, u32::MAX);
         let pass = passes::Resolve {
             node_segments: &trees.node_segments,
             segments: &trees.segments,

@@ -207,6 +207,7 @@ impl ImplicitVisibility {
         }
         for window in &self.linking.windows {
             let leaves = window.plan.leaves();
+            recorder.fill(&window.light_bins, 0);
             let pass = passes::Survey {
                 winners: &window.winners,
                 receivers: &self.linking.receivers,
