@@ -66,8 +66,9 @@ void hold_corners(uint from)
     }
 }
 
-// The cell of a leaf is where its vertex has the largest barycentric coordinate of the triangles around it.
-bool is_in_cell(float p, float q) { return min(p, q) >= 0.0 && 1.0 - p - q >= max(p, q); }
+// The cell of a leaf is where its vertex has the largest barycentric coordinate of the triangles around it. A number, not a
+// truth: threads in lockstep branch for truths.
+uint is_in_cell(float p, float q) { return uint(p >= 0.0) & uint(q >= 0.0) & uint(2.0 * p + q <= 1.0) & uint(p + 2.0 * q <= 1.0); }
 
 // Where a direction meets the sender, in lengths of the direction; FAR where it does not.
 struct Meeting {
@@ -87,7 +88,7 @@ Meeting meet_leaf(vec3 to_vertex, vec3 direction)
         bool is_shown = !is_back || (sender.sides & CELL_HAS_OTHER_SIDE) == 0;
         vec3 from_vertex = t * direction - to_vertex;
         bool is_nearer = t > 0.0 && t < nearest.t && is_shown
-                         && is_in_cell(dot(along_p[k], from_vertex), dot(along_q[k], from_vertex));
+                         && is_in_cell(dot(along_p[k], from_vertex), dot(along_q[k], from_vertex)) != 0;
         nearest.t = is_nearer ? t : nearest.t;
         nearest.is_back = is_nearer ? is_back : nearest.is_back;
     }
@@ -101,11 +102,11 @@ float meet_ellipse(SeenEllipse e, vec3 direction)
     float t = e.volume / slope;
     if (KIND != OF_FLAT_LEAVES) return t > 0.0 && x * x + y * y <= slope * slope ? t : FAR;
     vec2 from_vertex = vec2(-x, y) / slope - sender.vertex.xy;
-    bool is_in = false;
+    uint is_in = 0;
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        is_in = is_in || is_in_cell(dot(along_p[k].xy, from_vertex), dot(along_q[k].xy, from_vertex));
+        is_in |= is_in_cell(dot(along_p[k].xy, from_vertex), dot(along_q[k].xy, from_vertex));
     }
-    return is_in && t > 0.0 ? t : FAR;
+    return is_in != 0 && t > 0.0 ? t : FAR;
 }
 
 // Fronts of a body hide as many backs: these show for the most part where they are twice as many. All that looks either
