@@ -47,6 +47,9 @@ pub struct Options {
     pub no_optional_features: bool,
     /// Pretend that this is the largest buffer a pass can bind, bytes.
     pub max_storage_buffer_bytes: Option<u64>,
+    /// Fold lists of threads into rows of so many workgroups at most; of as many as the device allows where empty. To show
+    /// that passes over lists longer than a row find their places.
+    pub max_row_of_workgroups: Option<u32>,
     /// Most device memory that all objects together may take, bytes; all that the device has where empty. What is made
     /// for the device on the host keeps to it too.
     pub max_memory_bytes: Option<u64>,
@@ -95,6 +98,9 @@ impl Context {
         let mut device = Device::new(instance, candidate, enabled, !options.gpu_assisted)?;
         if let Some(bytes) = options.max_storage_buffer_bytes {
             device.limits.storage_buffer_bytes = device.limits.storage_buffer_bytes.min(bytes);
+        }
+        if let Some(longest) = options.max_row_of_workgroups {
+            device.limits.row_of_workgroups = device.limits.row_of_workgroups.min(longest.max(1));
         }
         device.max_memory_bytes = options.max_memory_bytes.unwrap_or(u64::MAX);
         let device = Arc::new(device);

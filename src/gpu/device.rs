@@ -25,6 +25,8 @@ pub struct Limits {
     pub texel_buffer_elements: u32,
     /// Workgroups per dispatch dimension.
     pub workgroup_count: u32,
+    /// Workgroups of a row that long lists of threads are folded into.
+    pub row_of_workgroups: u32,
     pub image_extent: u32,
     pub image_layers: u32,
     pub textures: u32,
@@ -171,10 +173,12 @@ impl Device {
                 .checked("vkCreateSemaphore", "start")?;
 
             let l = instance.raw.get_physical_device_properties(physical).limits;
+            let workgroup_count = l.max_compute_work_group_count[0].min(l.max_compute_work_group_count[1]);
             let limits = Limits {
                 storage_buffer_bytes: u64::from(l.max_storage_buffer_range),
                 texel_buffer_elements: l.max_texel_buffer_elements,
-                workgroup_count: l.max_compute_work_group_count[0].min(l.max_compute_work_group_count[1]),
+                workgroup_count,
+                row_of_workgroups: workgroup_count,
                 image_extent: l
                     .max_image_dimension2_d
                     .min(l.max_image_dimension_cube)

@@ -241,8 +241,8 @@ impl<'c> Recorder<'c> {
         let (groups, count) = match threads {
             Threads::Linear(count) => {
                 let groups = count.div_ceil(size[0]);
-                // Fold a long list into rows of at most `limit` workgroups.
-                let rows = groups.div_ceil(limit).max(1);
+                // Fold a long list into rows.
+                let rows = groups.div_ceil(self.context.device.limits.row_of_workgroups).max(1);
                 ([groups.div_ceil(rows), rows, 1], u64::from(count))
             }
             Threads::Grid(x, y, z) => (

@@ -24,7 +24,7 @@ fn metal(color: f32, roughness: f32) -> Material {
 }
 
 /// The fixture with its specular lobes, which the others leave out.
-fn glossy(context: &TestContext, mut fixture: Fixture) -> Fixture {
+pub fn glossy(context: &TestContext, mut fixture: Fixture) -> Fixture {
     let pose = Pose::rest(&fixture.scene);
     let Fixture { scene, geometry, environment, .. } = &fixture;
     fixture.world = World::new(context, scene, geometry, &pose, environment, false).unwrap();

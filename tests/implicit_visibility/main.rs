@@ -7,6 +7,7 @@ mod common;
 mod compare;
 mod dynamics;
 mod fixture;
+mod folded;
 mod gather_twin;
 mod gloss_twins;
 mod glossy;

@@ -32,11 +32,8 @@ fn winners_are_the_nearest_of_a_leaf_and_what_is_above() {
             let own = key(0, leaf as u32, bin);
             let above = trees.parent(leaf as u32).map_or(EMPTY_KEY, |parent| key(1, parent, bin));
             from_above += usize::from(above < own);
-            // A bin's corners tell whether all of it lies below the horizon.
-            let at = |cell: u32, corner: u32| 2.0 * f64::from(cell + corner) / f64::from(settings.bins) - 1.0;
-            let (n, bin) = (settings.bins, bin as u32);
-            let corner = |k: u32| bins::face_direction(bin / (n * n), at(bin % n, k & 1), at(bin / n % n, k >> 1));
-            let highest = (0..4).map(|k| corner(k).as_vec3().dot(receivers[leaf].normal)).fold(f32::MIN, f32::max);
+            // What lies below the horizon as a whole stays empty.
+            let highest = twins::highest(bin as u32, receivers[leaf].normal, settings.bins);
             if highest.abs() > 1e-5 {
                 let expected = if highest > 0.0 { own.min(above) as u32 } else { twins::EMPTY };
                 assert_eq!(winner, expected, "leaf {leaf}, bin {bin}");

@@ -68,7 +68,6 @@ fn winners_around(row: &[u32], direction: Vec3, n: u32) -> Vec<u32> {
 
 /// What the elements and the emitters of a method see.
 struct Seen<'a> {
-    fixture: &'a Fixture,
     method: &'a ImplicitVisibility,
     rows: Vec<Vec<u32>>,
     receivers: Vec<Receiver>,
@@ -79,7 +78,7 @@ struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    fn new(context: &TestContext, fixture: &'a Fixture, method: &'a ImplicitVisibility) -> Self {
+    fn new(context: &TestContext, fixture: &Fixture, method: &'a ImplicitVisibility) -> Self {
         let samples = context.download(&method.emitters().samples).unwrap();
         let mut around = vec![Vec::new(); fixture.rest_positions.len()];
         for triangle in &fixture.geometry.triangles {
@@ -88,7 +87,6 @@ impl<'a> Seen<'a> {
         }
         Self {
             around,
-            fixture,
             method,
             rows: winners(context, method),
             receivers: context.download(&method.linking().receivers).unwrap(),

@@ -93,3 +93,10 @@ pub fn weights(normal: Vec3, vectors: &[Vec3]) -> Vec<f64> {
     let total: f64 = raw.clone().sum();
     raw.map(|weight| weight * std::f64::consts::PI / total).collect()
 }
+
+/// How far the highest corner of a bin lies above the plane across a normal.
+pub fn highest(bin: u32, normal: Vec3, n: u32) -> f32 {
+    let at = |cell: u32| 2.0 * f64::from(cell) / f64::from(n) - 1.0;
+    let corner = |k: u32| bins::face_direction(bin / (n * n), at(bin % n + (k & 1)), at(bin / n % n + (k >> 1)));
+    (0..4).map(|k| corner(k).as_vec3().dot(normal)).fold(f32::MIN, f32::max)
+}
