@@ -115,8 +115,8 @@ fn views_show_the_links_of_the_picked_element_both_ways() {
 #[test]
 fn two_devices_make_the_links_of_one_to_the_bit() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("dancer"), None);
-    for packed_links in [false, true] {
+    for (name, max_edge, packed_links) in [("dancer", None, false), ("cornell-box", Some(1.0), true)] {
+        let fixture = Fixture::new(&context, builtin_scene(name), max_edge);
         let settings = Settings { packed_links, ..few_rays() };
         pose(&context, &fixture, 0.0);
         let mut alone = fixture.prepare(&context, settings);

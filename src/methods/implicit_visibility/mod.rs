@@ -21,9 +21,9 @@
 //! Differs from [Dong2007]: neighbouring receivers find their senders by one walk over the trees, which a queue of pairs
 //! would only scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
 //! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
-//! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small
-//! emitters are tested against the bins as against a shadow map; punctual lights cast shadow rays; glossy elements send
-//! tables of directions along the links (`gloss`). Not done: mirrors sharper than a bin, holes of alpha masks.
+//! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small emitters are hidden by
+//! the surfaces of the winners around the way, of both ends (`shadows`); punctual lights cast shadow rays; glossy elements
+//! send tables of directions along the links (`gloss`). Not done: mirrors sharper than a bin, holes of alpha masks.
 //!
 //! [Dong2007]: crate::methods::PAPERS
 

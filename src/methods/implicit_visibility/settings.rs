@@ -56,7 +56,8 @@ crate::settings! {
         spin: f32 = 0.0, range -360.0..=360.0, unit "degrees", paper "0";
         /// How light of emissive surfaces reaches the elements directly.
         emitters: EmitterChoice = EmitterChoice::Auto, paper "along links";
-        /// Points on sampled emitters, together; each is tested against the bins of every element.
+        /// Points on sampled emitters, together; each is hidden by the surfaces that the bins around the way to it name, of the
+        /// element and of the emitter.
         emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
         /// Surfaces that reflect at least so much at normal incidence are glossy: they send their lobe along; 2 for none.
         glossy: f32 = 0.1, range 0.0..=2.0, paper "all";
