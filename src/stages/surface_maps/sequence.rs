@@ -4,7 +4,7 @@
 
 use crate::scene::atlas::{Atlas, NO_TEXEL, Texel};
 use glam::{UVec2, Vec3};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 crate::choice! {
     /// How the texels are walked.
@@ -39,23 +39,64 @@ fn greedy(texels: &[Texel]) -> Vec<u32> {
     order
 }
 
-/// Walks chart after chart, each by `within` from the texel nearest to where the last one ended.
+/// Walks chart after chart, each by `within` from the texel nearest to where the last one ended, among charts that face
+/// alike before others: what lies below a chart's own plane its maps leave open, and alike ones leave open the same.
+/// Differs from [Ritschel2008]: there the nearest chart is next, whatever it faces.
 fn by_chart(atlas: &Atlas, within: impl Fn(&Atlas, &[u32], u32, &mut Vec<u32>)) -> Vec<u32> {
-    let mut charts: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut charts: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (index, texel) in atlas.texels.iter().enumerate() {
         charts.entry(texel.chart).or_default().push(index as u32);
     }
-    let mut nearest = NearestLeft::new(atlas.texels.iter().map(|texel| texel.position).collect());
+    let texel = |index: u32| &atlas.texels[index as usize];
+    let mut alike: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
+    for chart in charts.values() {
+        let normal: Vec3 = chart.iter().map(|&index| texel(index).area * texel(index).normal).sum();
+        alike.entry(facing(normal)).or_default().extend(chart);
+    }
     let mut order = Vec::with_capacity(atlas.texels.len());
-    let mut next = (!atlas.texels.is_empty()).then_some(0);
-    while let Some(first) = next {
-        let chart = &charts[&atlas.texels[first as usize].chart];
-        within(atlas, chart, first, &mut order);
-        chart.iter().for_each(|&texel| nearest.take(texel));
-        let last = order.last().map_or(Vec3::ZERO, |&texel| atlas.texels[texel as usize].position);
-        next = nearest.to(last);
+    let (mut last, mut faces) = (Vec3::ZERO, None);
+    while let Some(next) = alike.keys().copied().reduce(|a, b| if turn(faces, b) < turn(faces, a) { b } else { a }) {
+        let members = alike.remove(&next).unwrap_or_default();
+        faces = Some(next);
+        let mut nearest = NearestLeft::new(members.iter().map(|&index| texel(index).position).collect());
+        let place: HashMap<u32, u32> = members.iter().copied().zip(0..).collect();
+        while let Some(first) = nearest.to(last) {
+            let first = members[first as usize];
+            let chart = &charts[&texel(first).chart];
+            within(atlas, chart, first, &mut order);
+            chart.iter().for_each(|index| nearest.take(place[index]));
+            last = order.last().map_or(last, |&index| texel(index).position);
+        }
     }
     order
+}
+
+/// Cells a side of each face of a cube, by which directions are told apart.
+const FACING_CELLS: usize = 31;
+
+/// Number of the cell that a direction, of any length, goes through.
+fn facing(normal: Vec3) -> usize {
+    let axis = normal.abs().max_position();
+    let (along, across) = (normal[axis], [normal[(axis + 1) % 3], normal[(axis + 2) % 3]]);
+    let cell = |c: f32| ((c / along.abs().max(f32::MIN_POSITIVE) * 0.5 + 0.5) * FACING_CELLS as f32) as usize;
+    let [u, v] = across.map(|c| cell(c).min(FACING_CELLS - 1));
+    ((2 * axis + usize::from(along < 0.0)) * FACING_CELLS + v) * FACING_CELLS + u
+}
+
+/// The middle of a cell, unit.
+fn faced(cell: usize) -> Vec3 {
+    let middle = |k: usize| (2.0 * (k % FACING_CELLS) as f32 + 1.0) / FACING_CELLS as f32 - 1.0;
+    let (face, axis) = (cell / (FACING_CELLS * FACING_CELLS), cell / (2 * FACING_CELLS * FACING_CELLS));
+    let mut direction = Vec3::ZERO;
+    direction[axis] = if face % 2 == 0 { 1.0 } else { -1.0 };
+    direction[(axis + 1) % 3] = middle(cell);
+    direction[(axis + 2) % 3] = middle(cell / FACING_CELLS);
+    direction.normalize()
+}
+
+/// How far one cell is turned from another.
+fn turn(from: Option<usize>, to: usize) -> f32 {
+    from.map_or(0.0, |from| faced(from).distance(faced(to)))
 }
 
 /// Rows from the top, or from the bottom where the start is nearer to it, every other one backwards.
@@ -227,6 +268,20 @@ mod tests {
             println!("{sequence:?}: {short} of {} steps are short", order.len());
             assert!(short * 10 > order.len() * 9, "{sequence:?}: {short} short steps");
         }
+    }
+
+    /// Charts that face alike follow each other, whatever order they lie in, and cells are those of their own middles.
+    #[test]
+    fn charts_that_face_alike_are_walked_together() {
+        let cells = 6 * FACING_CELLS * FACING_CELLS;
+        assert!((0..cells).all(|cell| facing(faced(cell)) == cell && turn(Some(cell), cell) == 0.0));
+        let atlas = cornell();
+        let order = walk(&atlas, Sequence::Spiral);
+        let faces: Vec<usize> = order.iter().map(|&t| facing(atlas.texels[t as usize].normal)).collect();
+        let changes = faces.windows(2).filter(|pair| pair[0] != pair[1]).count();
+        let distinct: std::collections::BTreeSet<usize> = faces.into_iter().collect();
+        assert_eq!(changes + 1, distinct.len(), "flat charts alone: every direction is walked through once");
+        assert!(distinct.len() > 5);
     }
 
     #[test]
