@@ -229,7 +229,11 @@ fn what_does_not_fit_is_refused_in_words() {
     let error = linklight::methods::surface_shadow_maps::SurfaceShadowMaps::prepare(&context, &stage, settings);
     let message = error.err().expect("202 charts do not fit into 8 x 8 texels").to_string();
     assert!(message.contains("charts do not fit") && message.contains("atlas_resolution="), "{message}");
-    let settings = Settings { atlas_resolution: 512, visibility: TexelVisibility::Maps, ..SMALL };
+    // One chart fills the atlas.
+    let plane = parallelogram(Vec3::ZERO, Vec3::X, Vec3::Z, 1, 0);
+    let fixture = Fixture::new(&context, scene(vec![one_sided(0.5)], vec![plane], &[]), &Environment::default());
+    let stage = fixture.stage(None, &linklight::stages::work::Unwatched);
+    let settings = Settings { atlas_resolution: 264, visibility: TexelVisibility::Maps, ..SMALL };
     let error = linklight::methods::surface_shadow_maps::SurfaceShadowMaps::prepare(&context, &stage, settings);
     let message = error.err().expect("more texels than places").to_string();
     assert!(message.contains("65536") && message.contains("lower atlas_resolution"), "{message}");

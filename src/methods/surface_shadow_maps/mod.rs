@@ -24,7 +24,8 @@
 //!
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
-//! direct light of emissive texels comes by the same walk; texels that stand close together may share a map
+//! direct light of emissive texels comes by the same walk; texels receive at points drawn all over their surface, since
+//! those of small charts are large; texels that stand close together may share a map
 //! ([`Settings::map_sharing`]).
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
