@@ -98,7 +98,7 @@ fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) ->
         }
     }
     let laid: Vec<twins::Nodes> = elements.iter().map(|e| twins::nodes(&tables, e)).collect();
-    elements.iter_mut().zip(&laid).for_each(|(e, laid)| *e = twins::exposed(*e, laid.share));
+    elements.iter_mut().zip(&laid).for_each(|(e, laid)| *e = twins::exposed(*e, laid));
     let (mut fits, mut means) = (Vec::new(), Vec::new());
     for (e, laid) in elements.iter().zip(&laid) {
         let (rows, of_functions) = twins::fit(&tables, e, &laid.places, FUNCTIONS);

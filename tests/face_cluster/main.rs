@@ -13,3 +13,4 @@ mod pair_twins;
 mod pairs;
 mod physics;
 mod twins;
+mod way_twins;

@@ -1,8 +1,9 @@
 //! Twins of what decides pairs: visibility, transport, bounds and splits.
 
-use crate::twins::{Tables, Vectors, basis, count, fit, frame, node_coordinates, turn, vector_area};
+use crate::twins::{Tables, Vectors, basis, fit, node_coordinates, vector_area};
+use crate::way_twins::{Blockers, Ends, Shares, free_ways, shares_of, visibility};
 use glam::{DVec3, Vec3};
-use linklight::gpu::shaders::types::{ClusterInstance, FaceElement, Light};
+use linklight::gpu::shaders::types::{FaceElement, Light};
 use std::f64::consts::PI;
 
 pub const DONE: u32 = 0;
@@ -92,83 +93,6 @@ fn triangle_vector(x: DVec3, normal: DVec3, corners: [DVec3; 3]) -> DVec3 {
     if sum.dot(normal) < 0.0 { -sum } else { sum }
 }
 
-/// What says whether light passes.
-#[derive(Clone, Copy, PartialEq)]
-pub enum Blockers {
-    Triangles,
-    Clusters,
-}
-
-fn meets(x: DVec3, y: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
-    let d = y - x;
-    let n = (b - a).cross(c - a);
-    let t = (a - x).dot(n) / d.dot(n);
-    let p = x + t * d;
-    t > 1e-4 && t < 1.0 - 1e-4 && [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(p - s).dot(n) >= 0.0)
-}
-
-/// Share of the way from x to y that is free; faces of `passed` (first place and count) block nothing.
-pub fn visibility(t: &Tables, by: Blockers, passed: [[u32; 2]; 2], width: f64, x: DVec3, y: DVec3) -> f64 {
-    let within = |place: u32, [first, count]: [u32; 2]| place >= first && place < first + count;
-    if by == Blockers::Triangles {
-        let blocks = |triangle: u32| {
-            let place = t.places[triangle as usize];
-            !passed.iter().any(|&range| within(place, range)) && meets(x, y, t.corners(triangle))
-        };
-        return if (0..t.triangles.len() as u32).any(blocks) { 0.0 } else { 1.0 };
-    }
-    let mut share = 1.0;
-    for inst in t.instances.iter().filter(|inst| inst.is_back == 0) {
-        share *= past_cluster(t, inst, inst.first_cluster, passed, width, x, y);
-    }
-    share
-}
-
-/// Of one cluster and all below it.
-fn past_cluster(
-    t: &Tables,
-    inst: &ClusterInstance,
-    index: u32,
-    passed: [[u32; 2]; 2],
-    width: f64,
-    x: DVec3,
-    y: DVec3,
-) -> f64 {
-    let c = &t.clusters[index as usize];
-    let (first, last) = (inst.first_triangle + c.first_face, inst.first_triangle + c.first_face + count(c));
-    let is_passed = passed.iter().any(|&[f, n]| first >= f && last <= f + n);
-    let holds = passed.iter().any(|&[f, n]| first < f + n && f < last);
-    let (linear, at) = frame(inst);
-    let to_box = |p: DVec3| turn(c).inverse() * (linear.inverse() * (p - at) - c.center.as_dvec3());
-    let (o, d, h) = (to_box(x), to_box(y) - to_box(x), c.half_extent.as_dvec3());
-    let (mut enter, mut leave) = (1e-4f64, 1.0 - 1e-4f64);
-    for k in 0..3 {
-        let d = if d[k] == 0.0 { 1e-20 } else { d[k] };
-        let (p, q) = ((-h[k] - o[k]) / d, (h[k] - o[k]) / d);
-        (enter, leave) = (enter.max(p.min(q)), leave.min(p.max(q)));
-    }
-    if is_passed || enter > leave {
-        return 1.0;
-    }
-    let shadow = 2.0 * h.length() * f64::from(inst.scale) / (1.0 - 0.5 * (enter + leave)).max(1e-3);
-    match t.children(index) {
-        Some(children) if holds || shadow > width => {
-            children.into_iter().map(|child| past_cluster(t, inst, child, passed, width, x, y)).product()
-        }
-        None if count(c) == 1 => f64::from(u8::from(!meets(x, y, t.corners(t.triangle_at(inst, c.first_face))))),
-        _ if holds => 1.0,
-        _ => {
-            let d = d.normalize();
-            let f = c.facing.map(f64::from);
-            let seen = |sign: f64| -> f64 {
-                (0..3).map(|k| (sign * d[k]).max(0.0) * f[2 * k] + (-sign * d[k]).max(0.0) * f[2 * k + 1]).sum()
-            };
-            let of_box = 4.0 * (d.x.abs() * h.y * h.z + d.y.abs() * h.z * h.x + d.z.abs() * h.x * h.y);
-            1.0 - (seen(1.0).max(seen(-1.0)) / of_box.max(1e-30)).min(1.0)
-        }
-    }
-}
-
 /// Thresholds of light behind blocked rays that is looked for in the halves.
 const WORTH_LOOKING_ON: f64 = 5.0;
 
@@ -220,7 +144,8 @@ impl Reaching {
         (t, nodes): (&Tables, &[Vec3]),
         (a, shooter): (&FaceElement, Option<&FaceElement>),
         way: &Way,
-        free: impl Fn(bool) -> Vec<f64>,
+        free: impl Fn(bool) -> Shares,
+        measured: Option<&dyn Fn() -> Shares>,
         split: u32,
     ) -> Outcome {
         let most = self.greatest.iter().copied().fold(0.0, f64::max);
@@ -237,22 +162,32 @@ impl Reaching {
         }
         let is_small = stake <= 1.0;
         let shares = free(is_small);
-        if shares.iter().all(|&share| share == 0.0) {
+        quotients.extend(&shares.quotients);
+        let is_blocked = shares.of_nodes.iter().all(|&share| share == 0.0);
+        if is_blocked {
             let worth = if self.is_dark { 1.0 } else { WORTH_LOOKING_ON };
             quotients.push(stake / worth);
-            return Outcome::new(if stake > worth { split } else { DONE }, quotients);
+            if stake > worth && split != DONE {
+                return Outcome::new(split, quotients);
+            }
+            if is_small || measured.is_none() {
+                return Outcome::new(DONE, quotients);
+            }
         }
-        for (r, &share) in shares.iter().enumerate() {
-            self.at_nodes[r].iter_mut().for_each(|v| *v *= share);
+        for (r, &share) in shares.of_nodes.iter().enumerate() {
             self.least[r] *= f64::from(u8::from(share >= 0.999));
             self.greatest[r] *= f64::from(u8::from(share > 0.0));
         }
         let place = |r: usize| node_coordinates(t, a, nodes, r);
         let (fits, _) = fit(t, a, nodes, way.functions);
-        let on =
-            |k: usize, c: usize| -> DVec3 { (0..t.receiver_nodes).map(|r| fits[k][r] * self.at_nodes[r][c]).sum() };
-        let arrives: Vec<Vectors> = (0..way.functions).map(|k| [0, 1, 2].map(|c| on(k, c))).collect();
-        if !is_small && split != DONE {
+        let arriving = |shares: &[f64]| -> Vec<Vectors> {
+            let on = |k: usize, c: usize| -> DVec3 {
+                (0..t.receiver_nodes).map(|r| fits[k][r] * shares[r] * self.at_nodes[r][c]).sum()
+            };
+            (0..way.functions).map(|k| [0, 1, 2].map(|c| on(k, c))).collect()
+        };
+        let arrives = arriving(&shares.of_nodes);
+        if !is_small && !is_blocked && split != DONE {
             let said = |r: usize| -> f64 {
                 let normal = a.axis_z.as_dvec3() * vector_area(a);
                 let value = |(k, v): (usize, &Vectors)| basis(k, place(r)) * normal.dot(v[self.channel]);
@@ -265,19 +200,37 @@ impl Reaching {
                 return Outcome::new(split, quotients);
             }
         }
+        let Some(measured) = measured.filter(|_| !is_small) else {
+            return Outcome { decision: DONE, arrives: Some(arrives), quotients };
+        };
+        // Neither is trusted where they differ by too much. Else what nodes keep is dimmed, or what they lack is lit, until all of it is as free as measured.
+        let measured = measured();
+        quotients.extend(&measured.quotients);
+        let sizes = self.at_nodes.iter().map(|of| of.iter().map(|v| v.length()).sum::<f64>()).collect::<Vec<_>>();
+        let all: f64 = sizes.iter().sum();
+        let seen = if all > 0.0 {
+            sizes.iter().zip(&shares.of_nodes).map(|(size, share)| size * share).sum::<f64>() / all
+        } else {
+            1.0
+        };
+        let normal = a.axis_z.as_dvec3() * vector_area(a);
+        let strongest = self.at_nodes.iter().flatten().map(|v| normal.dot(*v)).fold(0.0, f64::max);
+        if split != DONE {
+            quotients.push(f64::from(a.most_albedo) * (measured.mean - seen).abs() * strongest / way.threshold);
+            if *quotients.last().unwrap() > 1.0 {
+                return Outcome::new(split, quotients);
+            }
+        }
+        if measured.mean == 0.0 {
+            return Outcome::new(DONE, quotients);
+        }
+        let of = |share: &f64| match measured.mean < seen {
+            true => share * measured.mean / seen,
+            false => 1.0 - (1.0 - share) * (1.0 - measured.mean) / (1.0 - seen).max(1e-6),
+        };
+        let arrives = arriving(&shares.of_nodes.iter().map(of).collect::<Vec<_>>());
         Outcome { decision: DONE, arrives: Some(arrives), quotients }
     }
-}
-
-/// Shares of the nodes, of those that were asked: of the others, and of a small pair's, the mean.
-fn shares_of(asked: &[(usize, f64)], count: usize, is_small: bool) -> Vec<f64> {
-    let mean = |own: &[f64]| own.iter().sum::<f64>() / own.len().max(1) as f64;
-    let all: Vec<f64> = asked.iter().map(|(_, share)| *share).collect();
-    let of = |r: usize| {
-        let own: Vec<f64> = asked.iter().filter(|(node, _)| *node == r).map(|(_, share)| *share).collect();
-        if own.is_empty() || is_small { mean(&all) } else { mean(&own) }
-    };
-    (0..count).map(of).collect()
 }
 
 /// Whether single precision may see a way on the other side of a face: along one axis it is exact.
@@ -324,10 +277,20 @@ pub fn transport(
         })
         .collect();
     let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
+    let mut quotients = Vec::new();
+    let mut nearness = |e: &FaceElement, x: DVec3| -> f64 {
+        let d = x - e.center.as_dvec3();
+        let off = DVec3::from_array(axes(e).map(|axis| d.dot(axis).abs())) - e.half_extent.as_dvec3();
+        let (squared, size) = (off.max(DVec3::ZERO).length_squared().max(1e-20), 0.5 * e.half_extent.as_dvec3());
+        quotients.push(squared / size.length_squared());
+        if squared < size.length_squared() { (f64::from(e.area) / (PI * squared)).min(1.0) } else { 0.0 }
+    };
+    let near_power = brightest * f64::from(b.area) * nearness(a, b.center.as_dvec3());
     for r in 0..t.receiver_nodes {
         let x = nodes[receiver][r].as_dvec3();
+        let around = if b.place_count == 1 { 0.0 } else { brightest * f64::from(a.area) * nearness(b, x) };
         let (mut vectors, mut sum) = ([DVec3::ZERO; 3], 0.0);
-        let (mut low, mut high, mut sends) = (f64::INFINITY, 0.0f64, false);
+        let (mut low, mut high, mut sends) = (f64::INFINITY, near_power.max(around), false);
         for (e, rule) in shooter_rule.iter().enumerate() {
             let d = nodes[shooter][t.receiver_nodes + e].as_dvec3() - x;
             let squared = d.length_squared().max(1e-20);
@@ -355,45 +318,29 @@ pub fn transport(
     }
     let strongest = unshot[shooter][0];
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
-    let turn = (a.cluster * 7 + b.cluster * 13) as usize;
-    let passed = [[a.first_place, a.place_count], [b.first_place, b.place_count]];
     let reaching = Reaching { at_nodes, least, greatest, is_dark: false, channel };
     let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
     let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
-    let ray = |r: usize, s: usize| {
-        let (x, y) = (at(receiver, r).0, at(shooter, receivers + s).0);
-        visibility(t, way.by, passed, 0.5 * f64::from(a.half_extent.y), x, y)
+    let ends = Ends {
+        elements: [a, b],
+        places: [&nodes[receiver], &nodes[shooter]],
+        normals: [&normals[receiver], &normals[shooter]],
     };
-    // The first node, by turns, that a receiver node faces and that faces it.
-    let facing = |r: usize, k: usize| {
-        let (x, n) = at(receiver, r);
-        (0..shooters).map(|e| (turn + k + e) % shooters).find(|&s| {
-            let (y, m) = at(shooter, receivers + s);
-            (y - x).dot(n) > 0.0 && (x - y).dot(m) > 0.0
-        })
-    };
-    let free = |is_small: bool| -> Vec<f64> {
-        let wanted = if is_small { 1 } else { receivers * way.rays_per_node };
-        let node = |k: usize| if is_small { (turn + k) % receivers } else { k % receivers };
-        let turns = (0..receivers * way.rays_per_node).map(|k| (node(k), facing(node(k), k)));
-        let mut asked: Vec<(usize, f64)> = turns.filter_map(|(r, s)| Some((r, ray(r, s?)))).take(wanted).collect();
-        if asked.is_empty() {
-            let k = receivers * way.rays_per_node;
-            asked.push((node(k), ray(node(k), (turn + k + shooters - 1) % shooters)));
-        }
-        shares_of(&asked, receivers, is_small)
-    };
+    let free = |is_small: bool| free_ways(t, &ends, way, false, is_small);
+    let measured = || free_ways(t, &ends, way, true, false);
     let split = match (can_split(a), can_split(b)) {
         (false, false) => DONE,
         (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
-    let mut outcome = reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, split);
+    let mut outcome = reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, Some(&measured), split);
     let is_unclear = |r: usize, s: usize| {
-        let (x, y) = (at(receiver, r), at(shooter, receivers + s));
+        let (x, y) = (at(receiver, r), at(shooter, s));
         is_level(x.1, y.0 - x.0) || is_level(y.1, x.0 - y.0)
     };
-    if (0..receivers).any(|r| (0..shooters).any(|s| is_unclear(r, s))) {
+    let all = receivers + shooters;
+    outcome.quotients.extend(quotients);
+    if (0..receivers).any(|r| (receivers..all).any(|s| is_unclear(r, s) || is_unclear(s, r))) {
         outcome.quotients.push(1.0);
     }
     outcome
@@ -473,7 +420,7 @@ pub fn transport_light(
     };
     let receivers = t.receiver_nodes;
     let first = a.cluster as usize % receivers;
-    let free = |is_small: bool| -> Vec<f64> {
+    let free = |is_small: bool| -> Shares {
         let order = (0..receivers).map(|k| if is_small { (first + k) % receivers } else { k });
         let order = order.filter(|&r| !is_dark(r));
         let faced = order.clone().filter(|&r| of(r).0.dot(normals[r].as_dvec3()) > 0.0);
@@ -484,7 +431,7 @@ pub fn transport_light(
         shares_of(&asked.iter().map(|&r| (r, ray(r))).collect::<Vec<_>>(), receivers, is_small)
     };
     let split = if t.children(a.cluster).is_some() { SPLIT_RECEIVER } else { DONE };
-    let mut outcome = reaching.decided((t, nodes), (a, None), way, free, split);
+    let mut outcome = reaching.decided((t, nodes), (a, None), way, free, None, split);
     if (0..receivers).any(|r| is_level(normals[r].as_dvec3(), of(r).0)) {
         outcome.quotients.push(1.0);
     }

@@ -2,7 +2,8 @@
 
 use crate::common::Random;
 use crate::grown::{FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, check, flat, grown_over};
-use crate::pair_twins::{self, Blockers, Outcome, Way};
+use crate::pair_twins::{self, Outcome, Way};
+use crate::way_twins::Blockers;
 use glam::{UVec2, Vec3};
 use linklight::gpu::Buffer;
 use linklight::gpu::shaders::methods::face_cluster as passes;

@@ -22,7 +22,7 @@ fn one_sided(albedo: f32) -> Material {
 fn form_factors_of_plates() {
     let context = TestContext::new();
     for (name, exact) in [("parallel-plates", 0.199_825), ("perpendicular-plates", 0.200_044)] {
-        let fixture = Fixture::new(&context, builtin_scene(name), Some(1.0 / 32.0));
+        let fixture = Fixture::new(&context, builtin_scene(name), Some(1.0 / 16.0));
         let mut transfers = Vec::new();
         for basis in [Basis::Constant, Basis::Linear, Basis::Quadratic] {
             let (mut errors, mut finest) = (Vec::new(), 0);
@@ -45,7 +45,6 @@ fn form_factors_of_plates() {
             transfers.push(finest);
         }
         // All faces with all faces, the constant basis is classical: within 1e-3.
-        let fixture = Fixture::new(&context, builtin_scene(name), Some(1.0 / 16.0));
         let settings = Settings { threshold: 1e-8, irradiance_basis: Basis::Constant, ..Settings::default() };
         let (power, area) = received(&leaves(&context, &fixture.solve(&context, settings, 0)), |e| e.albedo.x > 0.5);
         let error = (power / area / exact - 1.0).abs();

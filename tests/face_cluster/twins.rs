@@ -75,7 +75,6 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         facing.swap(0, 1);
         facing.swap(2, 3);
     }
-    let flat_share = (c.facing[4] - c.facing[5]) / c.area.max(1e-30);
     FaceElement {
         cluster,
         instance,
@@ -84,7 +83,8 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         level,
         first_place: inst.first_triangle + c.first_face,
         place_count: count(c),
-        self_share: if is_back { 1.0 } else { hollowness(c) } * (1.0 - flat_share).clamp(0.0, 1.0),
+        // Known when nodes are laid; until then whether there is any.
+        self_share: if is_back || hollowness(c) > 0.0 { 1.0 } else { 0.0 },
         center: (linear * c.center.as_dvec3() + at).as_vec3(),
         axis_x: axis(0),
         axis_y: axis(1),
@@ -268,10 +268,21 @@ pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Ve
     (rows, means)
 }
 
-/// Elements without what is hidden of them.
-pub fn exposed(mut e: FaceElement, share: f64) -> FaceElement {
-    e.area = (f64::from(e.area) * share) as f32;
-    e.facing = e.facing.map(|sum| (f64::from(sum) * share) as f32);
+/// Elements without what is hidden of them, and what they send themselves.
+pub fn exposed(mut e: FaceElement, laid: &Nodes) -> FaceElement {
+    e.area = (f64::from(e.area) * laid.share) as f32;
+    e.facing = e.facing.map(|sum| (f64::from(sum) * laid.share) as f32);
+    let count = laid.places.len();
+    let between = |k: usize, l: usize| -> f64 {
+        let d = (laid.places[l] - laid.places[k]).as_dvec3();
+        let cosines = d.dot(laid.normals[k].as_dvec3()).max(0.0) * (-d).dot(laid.normals[l].as_dvec3()).max(0.0);
+        let squared = d.length_squared().max(1e-20);
+        (f64::from(e.area) * cosines / (std::f64::consts::PI * squared * squared)).min(count as f64)
+    };
+    let pairs = (0..count).flat_map(|k| (0..count).filter(move |&l| l != k).map(move |l| (k, l)));
+    let form_factor = pairs.map(|(k, l)| between(k, l)).sum::<f64>() / (count * (count - 1)) as f64;
+    let bound = (1.0 - vector_area(&e) / f64::from(e.area).max(1e-30)).clamp(0.0, 1.0);
+    e.self_share *= form_factor.clamp(0.02 * bound, bound) as f32;
     e
 }
 

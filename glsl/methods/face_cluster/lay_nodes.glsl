@@ -70,6 +70,9 @@ vec3 laid_on_faces(ClusterInstance inst, uint cluster, vec3 point, inout vec3 no
     return mix(nearest_of_triangle(point, corners[0], corners[1], corners[2]), (corners[0] + corners[1] + corners[2]) / 3.0, 0.05);
 }
 
+// Of the element that was laid last.
+vec3 laid_places[RULE_NODES], laid_normals[RULE_NODES];
+
 // Lays all nodes; returns the share of the element's area that is not hidden. Nodes that are hidden are moved to where
 // some are not. A single face has a rule of its own, for triangles.
 // Differs from [Gobbetti2003]: there nodes lie in the box's plane, on its whole square.
@@ -80,8 +83,7 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
     vec3 corners[3];
     if (is_face) corners_of(inst, e.first_place - inst.first_triangle, corners);
     uint hidden = 0;
-    vec3 seen = e.center;
-    uint seen_normal = 0;
+    uint seen = 0;
     float exposed = 0.0;
     [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k) {
         CubatureNode node = rules[is_face ? RULE_NODES + k : k];
@@ -101,23 +103,35 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
             is_free = !is_hidden(place, side * normal, ray_offset);
             if (t == 0 && is_free) exposed += 1.0;
         }
-        uint packed_normal = packSnorm4x8(vec4(side * normal, 0.0));
-        if (is_free) {
-            seen = place;
-            seen_normal = packed_normal;
-        }
+        if (is_free) seen = k;
         hidden |= is_free ? 0u : 1u << k;
-        element_nodes[index * RULE_NODES + k] = place;
-        node_normals[index * RULE_NODES + k] = packed_normal;
+        laid_places[k] = place;
+        laid_normals[k] = side * normal;
     }
-    // Where none was found for one, another's.
-    if (bitCount(hidden) < RULE_NODES)
-        [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k)
-            if ((hidden >> k & 1u) != 0) {
-                element_nodes[index * RULE_NODES + k] = seen;
-                node_normals[index * RULE_NODES + k] = seen_normal;
-            }
+    [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k) {
+        // Where none was found for one, another's.
+        if ((hidden >> k & 1u) != 0 && bitCount(hidden) < RULE_NODES) {
+            laid_places[k] = laid_places[seen];
+            laid_normals[k] = laid_normals[seen];
+        }
+        element_nodes[index * RULE_NODES + k] = laid_places[k];
+        node_normals[index * RULE_NODES + k] = packSnorm4x8(vec4(laid_normals[k], 0.0));
+    }
     return max(exposed / float(RULE_NODES), LEAST_EXPOSED);
+}
+
+// Of what the element that was laid last sends, what meets itself if nothing stands between: the mean over its nodes.
+float self_form_factor(float area)
+{
+    float sum = 0.0;
+    [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k)
+        [[dont_unroll]] for (uint l = 0; l < k; ++l) {
+            vec3 d = laid_places[l] - laid_places[k];
+            float squared = max(dot(d, d), 1e-20);
+            float facing = max(dot(d, laid_normals[k]), 0.0) * max(-dot(d, laid_normals[l]), 0.0);
+            sum += min(facing * area / (PI * squared * squared), float(RULE_NODES));
+        }
+    return 2.0 * sum / float(RULE_NODES * (RULE_NODES - 1));
 }
 
 // Where a receiver node counts as standing: a face's where it is, others where the rule has them.

@@ -3,6 +3,7 @@
 #include "lib/prelude.glsl"
 #include "methods/face_cluster/receive.glsl"
 #include "methods/face_cluster/triangle_vector.glsl"
+#include "methods/face_cluster/ways.glsl"
 
 // One thread per (receiver, shooter) pair of the step: transports the shooter's unshot light if the bounds on what the
 // receiver reflects of it are tight enough, else says which of them is to be split.            [Gobbetti2003 3.3]
@@ -19,6 +20,16 @@ layout(push_constant, scalar) uniform Params {
     float units;        // per W/m2
     uint rays_per_node;
 } params;
+
+// Nearer to an element than half its size, its nodes do not tell how large it looks: the most of the hemisphere that it may
+// fill, and 0 farther off.
+float nearness(FaceElement e, vec3 x)
+{
+    vec3 d = x - e.center;
+    vec3 off = max(abs(vec3(dot(d, e.axis_x), dot(d, e.axis_y), dot(d, e.axis_z))) - e.half_extent, vec3(0.0));
+    float squared = max(dot(off, off), 1e-20);
+    return squared < 0.25 * dot(e.half_extent, e.half_extent) ? min(1.0, e.area / (PI * squared)) : 0.0;
+}
 
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
 
@@ -74,11 +85,13 @@ void main()
         uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + b.first_place - inst.first_triangle]];
         corners = vec3[3](positions[v.x], positions[v.y], positions[v.z]);
     }
+    // Differs from [Gobbetti2003]: bounds between nodes alone miss what touches, or lies close above.
+    float near_power = brightest * b.area * nearness(a, b.center);
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec3 x = receiver_node(receiver, r);
         at_nodes[r] = mat3(0.0);
         least[r] = 3e38;
-        greatest[r] = 0.0;
+        greatest[r] = is_face ? near_power : max(near_power, brightest * a.area * nearness(b, x));
         float sum = 0.0;
         bool sends = false;
         [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
@@ -116,56 +129,49 @@ void main()
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
 
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
-    uint turn = a.cluster * 7u + b.cluster * 13u;
-    float free[RECEIVER_NODES];
-    uint rays_from[RECEIVER_NODES];
-    uint ray_count = 0, most_rays = is_small ? 1 : RECEIVER_NODES * params.rays_per_node;
-    float sum_free = 0.0;
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        free[r] = 0.0;
-        rays_from[r] = 0;
-    }
-    // Faces that look away say nothing of what the others see: first come nodes that face each other, then, where there
-    // are none at all, any.
-    [[dont_unroll]] for (uint k = 0; k < RECEIVER_NODES * (params.rays_per_node + 1) && ray_count < most_rays; ++k) {
-        uint r = (is_small ? turn + k : k) % RECEIVER_NODES;
-        bool is_any = k >= RECEIVER_NODES * params.rays_per_node;
-        if (is_any && ray_count > 0) break;
-        vec3 x = receiver_node(receiver, r), normal = node_normal(receiver, r), y;
-        bool faces = false;
-        [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES && !faces; ++e) {
-            uint s = RECEIVER_NODES + (turn + k + e) % SHOOTER_NODES;
-            y = receiver_node(shooter, s);
-            faces = dot(y - x, normal) > 0.0 && dot(x - y, node_normal(shooter, s)) > 0.0;
-        }
-        if (!faces && !is_any) continue;
-        float share = visibility(a, Ray(x, 1e-4, y - x, 1.0 - 1e-4));
-        free[r] += share;
-        sum_free += share;
-        ++rays_from[r];
-        ++ray_count;
-    }
-    atomicAdd(pool[0].rays, ray_count);
-    bool any_free = sum_free > 0.0;
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r)
-        free[r] = rays_from[r] > 0 && !is_small ? free[r] / float(rays_from[r]) : sum_free / float(max(ray_count, 1));
     uint split = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
     bool may_split = can_split(a) || can_split(b);
-    if (!any_free) {
-        // What few rays miss is not dark: where that is too much to lose, it is looked for in the halves.
-        if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) decisions[i] = split;
-        return;
-    }
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        at_nodes[r] *= free[r];
-        if (free[r] < 0.999) least[r] = 0.0;
-        if (free[r] == 0.0) greatest[r] = 0.0;
-    }
-
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
-    project(receiver, at_nodes, on_functions);
-    if (!is_small && may_split) {
+    float free[RULE_NODES], shares[RULE_NODES];
+    float seen = 1.0, strongest_at = 0.0;   // W
+    [[dont_unroll]] for (uint round = 0; round < 2; ++round) {
+        bool measures = round == 1;
+        float mean = free_ways(a, b, receiver, shooter, measures, is_small, params.rays_per_node, shares);
+        if (measures || is_small) {
+            // Where both kinds of rays differ by too much light, neither is trusted.
+            if (measures && may_split && a.most_albedo * abs(mean - seen) * strongest_at > params.threshold) {
+                decisions[i] = split;
+                return;
+            }
+            if (mean <= 0.0) return;
+            [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) at_nodes[r] *= is_small ? mean : corrected(free[r], seen, mean);
+            project(receiver, at_nodes, on_functions);
+            break;
+        }
+        if (mean <= 0.0) {
+            // What few rays miss is not dark: where that is too much to lose, it is looked for in the halves.
+            if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) {
+                decisions[i] = split;
+                return;
+            }
+        }
+        float all = 0.0;
+        seen = 0.0;
+        mat3 seen_at[RECEIVER_NODES];
+        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
+            free[r] = shares[r];
+            float size = length(at_nodes[r][0]) + length(at_nodes[r][1]) + length(at_nodes[r][2]);
+            seen += size * free[r];
+            all += size;
+            strongest_at = max(strongest_at, vector_area(a) * most(a.axis_z * at_nodes[r]));
+            seen_at[r] = free[r] * at_nodes[r];
+            if (free[r] < 0.999) least[r] = 0.0;
+            if (free[r] == 0.0) greatest[r] = 0.0;
+        }
+        seen = all > 0.0 ? seen / all : 1.0;
+        if (!may_split || mean <= 0.0) continue;
         // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
+        project(receiver, seen_at, on_functions);
         float error = 0.0;
         vec3 strongest = unshot[shooter * RADIOSITY_FUNCTIONS];
         uint channel = strongest.x >= max(strongest.y, strongest.z) ? 0 : strongest.y >= strongest.z ? 1 : 2;

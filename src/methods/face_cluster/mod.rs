@@ -28,10 +28,12 @@
 //! cubature nodes are laid on the faces, on a single one by a rule for triangles, and a shooter of one face is measured
 //! exactly; what lies inside other closed bodies is no surface: it neither takes light nor weighs in a cluster's mean;
 //! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
-//! is too small to matter, since one normal would leave half of them dark; a transfer takes one shadow ray per receiver node unless told otherwise;
+//! is too small to matter, since one normal would leave half of them dark; what is near a large one is bounded by what that
+//! may fill of the hemisphere, since its nodes alone say too little; rays decide whether a pair is split and others measure
+//! what is let pass, one a node unless told otherwise, drawn by what would pass along them;
 //! transfers are made with the projected area expected between its bounds, not the lower bound, and what faces get beyond
 //! their vector area lies along the mean normal; (1 - F_ii) is not applied to what is reflected: F_ii of it is shot at
-//! the cluster itself, F_ii being less than its bound where faces lean outwards; while light is shot, inner elements have room for
+//! the cluster itself, F_ii being what its nodes see of each other, below the bound; while light is shot, inner elements have room for
 //! irradiance too, but a [`Solution`] is of leaves alone.
 //!
 //! [Gobbetti2003]: crate::methods::PAPERS
@@ -99,7 +101,8 @@ crate::settings! {
         shooter_rule: Rule = Rule::Six, paper "degree 4 (6 nodes)";
         /// What says whether light passes.
         visibility: Visibility = Visibility::Rays, paper "clusters";
-        /// Shadow rays from each receiver node, to shooter nodes by turns.
+        /// Shadow rays from each receiver node, to shooter nodes drawn by what would pass; as many from each of the other
+        /// nodes back measure what is let pass.
         rays_per_node: u32 = 1, range 1..=16, unit "rays", paper "one to every shooter node: 6";
         /// Iterations end when the largest unshot radiosity falls below this share of the first.
         convergence: f32 = 1e-3, range 0.0..=1.0, paper "a user-defined threshold; 10 iterations";
