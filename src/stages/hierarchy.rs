@@ -282,7 +282,7 @@ pub struct Hierarchy {
     pub plan: HierarchyPlan,
     pub nodes: Buffer<HierarchyNode>,
     pub leaves: Buffer<HierarchyLeaf>,
-    /// The nodes and their shapes for kernels over links, [`HIERARCHY_TEXELS`] each (`lib/packed_hierarchy.glsl`).
+    /// The nodes and their shapes for kernels over links, `HIERARCHY_TEXELS` each (`lib/packed_hierarchy.glsl`).
     pub node_texels: TexelBuffer,
     /// See [`HierarchyPlan::members`] and [`HierarchyPlan::shares`].
     pub members: Buffer<u32>,

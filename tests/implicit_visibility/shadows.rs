@@ -115,7 +115,7 @@ impl<'a> Seen<'a> {
             trees.leaves(above).any(|leaf| {
                 let vertex = topology.vertices[trees.leaf_elements[leaf as usize] as usize] & !BACK_SIDE;
                 self.around[vertex as usize].iter().any(|&[a, b, c]| {
-                    // [Moeller1997]
+                    // [Moller1997]
                     let (p, q) = (b - a, c - a);
                     let (across, from) = (way.cross(q), origin - a);
                     let det = p.dot(across);
