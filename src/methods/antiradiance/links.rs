@@ -13,7 +13,7 @@ use std::f32::consts::PI;
 /// Pairs of one step of the queue.
 const QUEUE_BATCH: u32 = 8192;
 /// Links a leaf that a first attempt has room for; where there are more, they are counted by it, and made again.
-const FIRST_GUESS: u64 = 160;
+const FIRST_GUESS: u64 = 112;
 /// Buffers that links are spread over where one may not hold them, in `refine_links.comp`.
 const PARTS: usize = 4;
 /// 1.0 in bits.
