@@ -186,7 +186,7 @@ fn device_gather_ms(context: &Context, method: &Antiradiance) -> f64 {
     let tables = method.tables();
     context.take_records();
     let mut recorder = context.recorder("bench").unwrap();
-    method.transfers().gather(&mut recorder, tables.half, &tables.exitant, &tables.incident);
+    method.transfers().gather(&mut recorder, tables);
     recorder.submit().unwrap();
     device_ms(&context.take_records(), &["gather", "fill"])
 }

@@ -34,7 +34,7 @@ crate::choice! {
 pub struct DirectionBins {
     /// Cells a side of half the sphere, 2k.
     pub side: u32,
-    /// Unit; the mean over each bin.
+    /// Unit; the mean over each bin. Bins 2p and 2p + 1 are opposite, the first looks up (+z).
     pub directions: Vec<Vec3>,
 }
 
@@ -42,18 +42,14 @@ impl DirectionBins {
     /// `octant_side` is k.
     pub fn new(octant_side: u32) -> Self {
         let side = 2 * octant_side;
-        let upper = (0..side * side).map(|bin| {
+        let upper = (0..side * side).map(|cell| {
             let samples = (0..SUBCELLS * SUBCELLS).map(|s| Vec2::new((s % SUBCELLS) as f32, (s / SUBCELLS) as f32));
-            let sum: Vec3 = samples.map(|s| direction_in(bin, side, (s + 0.5) / SUBCELLS as f32)).sum();
+            let sum: Vec3 = samples.map(|s| direction_in(cell, side, (s + 0.5) / SUBCELLS as f32)).sum();
             let p = sum.normalize().truncate();
             // As the device makes it from x and y.
             p.extend((1.0 - p.dot(p)).max(0.0).sqrt())
         });
-        let mut directions: Vec<Vec3> = upper.collect();
-        directions.extend_from_within(..);
-        directions[(side * side) as usize..].reverse();
-        directions[(side * side) as usize..].iter_mut().for_each(|w| *w = -*w);
-        Self { side, directions }
+        Self { side, directions: upper.flat_map(|w| [w, -w]).collect() }
     }
 
     pub fn count(&self) -> u32 {
@@ -67,7 +63,7 @@ impl DirectionBins {
 
     /// The bin of the reversed directions.
     pub fn opposite(&self, bin: u32) -> u32 {
-        self.count() - 1 - bin
+        bin ^ 1
     }
 
     /// Bin of a unit direction, as `bin_of` of `lib/direction_bins.glsl`.
@@ -85,7 +81,9 @@ impl DirectionBins {
         }
         let cell =
             ((p * 0.5 + 0.5) * self.side as f32).max(Vec2::ZERO).as_uvec2().min(glam::UVec2::splat(self.side - 1));
-        (if w.z < 0.0 { self.side } else { 0 } + cell.y) * self.side + cell.x
+        let index = cell.y * self.side + cell.x;
+        // Below, cells are counted from the end: there lies the one opposite to a cell above.
+        if w.z < 0.0 { 2 * (self.side * self.side - 1 - index) + 1 } else { 2 * index }
     }
 
     /// Classes beside class 0: the last is for senders of half the sphere.
@@ -140,9 +138,8 @@ impl DirectionBins {
     }
 }
 
-/// Direction at `at` (0..1 twice) inside a bin.
-fn direction_in(bin: u32, side: u32, at: Vec2) -> Vec3 {
-    let (half, cell) = (bin / (side * side), bin % (side * side));
+/// Direction at `at` (0..1 twice) inside a cell of the upper half.
+fn direction_in(cell: u32, side: u32, at: Vec2) -> Vec3 {
     let p = 2.0 * (Vec2::new((cell % side) as f32, (cell / side) as f32) + at) / side as f32 - 1.0;
     let (r, phi) = if p == Vec2::ZERO {
         (0.0, 0.0)
@@ -154,13 +151,13 @@ fn direction_in(bin: u32, side: u32, at: Vec2) -> Vec3 {
     // r^2 = 1 - |z| keeps areas in proportion from the disc to half the sphere.
     let scale = (2.0 - r * r).max(0.0).sqrt();
     let z = 1.0 - r * r;
-    Vec3::new(r * phi.cos() * scale, r * phi.sin() * scale, if half == 0 { z } else { -z })
+    Vec3::new(r * phi.cos() * scale, r * phi.sin() * scale, z)
 }
 
 /// The bins on the device.
 pub struct DeviceBins {
     pub bins: DirectionBins,
-    /// Of each bin: x and y, the bits of two floats; z is what is left, up for the first half of the bins.
+    /// Of each bin: x and y, the bits of two floats; z is what is left, up for even bins.
     pub directions: Buffer<u64>,
     /// See [`DirectionBins::spread_lists`].
     pub spread_offsets: Buffer<u32>,
@@ -195,7 +192,7 @@ mod tests {
                 let bin = bin as u32;
                 assert_eq!((bins.bin_of(w), bins.bin_of(-w)), (bin, bins.opposite(bin)), "k = {k}, {w}");
                 assert_eq!(bins.directions[bins.opposite(bin) as usize], -w);
-                assert!(w.is_normalized() && (w.z > 0.0) == (bin < bins.count() / 2));
+                assert!(w.is_normalized() && (w.z > 0.0) == bin.is_multiple_of(2));
             }
         }
     }

@@ -74,7 +74,7 @@ impl State {
             lobes: context.download(&tables.gloss.lobes).unwrap(),
             directions: method.bins().bins.directions.clone(),
             norms: context.download(&tables.cosine_norms).unwrap(),
-            incident: entries(context, &tables.incident, tables.bin_count),
+            incident: entries(context, tables, |window| &window.incident),
             parents: nodes.iter().map(|node| node.parent).collect(),
             scales: context.download(&tables.scales).unwrap(),
             means: context.download(&tables.means).unwrap(),

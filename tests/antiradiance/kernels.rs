@@ -5,11 +5,14 @@ use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
 use crate::support::{by_node, entries, prepare, settings};
 use crate::twins::{self, Transferring};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, UVec2, Vec3};
 use linklight::gpu::Options;
 use linklight::methods::antiradiance::{LocalStep, Settings, link_solid_angle};
+use linklight::scene::camera::View;
+use linklight::scene::pose::Pose;
 use linklight::scene::{LightKind, Scene};
 use linklight::stages::direction_bins::Spread;
+use linklight::stages::world::World;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Largest difference, of the largest value expected.
@@ -114,7 +117,7 @@ fn a_step_agrees_with_its_twin() {
         let norms = context.download(&tables.cosine_norms).unwrap();
         let albedo = context.download(&method.elements().albedo).unwrap();
         let source = context.download(&tables.source).unwrap();
-        let before = entries(&context, &tables.exitant, tables.bin_count);
+        let before = entries(&context, tables, |window| &window.exitant);
         let transfers = method.transfers().download(&context).unwrap();
         let means = context.download(&tables.means).unwrap();
         let scales = context.download(&tables.scales).unwrap();
@@ -143,7 +146,7 @@ fn a_step_agrees_with_its_twin() {
             expected[row].copy_from_slice(&twin.exitant);
         }
         twins::pull(&nodes, m as u32, &mut expected);
-        let found = entries(&context, &tables.exitant, tables.bin_count);
+        let found = entries(&context, tables, |window| &window.exitant);
         assert!(difference(&found, &expected) < 2e-5, "{}", difference(&found, &expected));
         let found_irradiance = context.download(&tables.irradiance).unwrap();
         assert!(difference(&found_irradiance, &irradiance) < 2e-5);
@@ -153,30 +156,36 @@ fn a_step_agrees_with_its_twin() {
     }
 }
 
-/// Transfers cut into windows, and links spread over buffers, give the same light, to the bit.
+/// Tables and transfers cut into windows, and links spread over buffers, give the same light, to the bit; glossy leaves too.
 #[test]
 fn a_low_buffer_limit_gives_the_same_light() {
     let light = |limit: Option<u64>| {
         let context = TestContext::with(Options { max_storage_buffer_bytes: limit, ..Options::default() });
-        let fixture = Fixture::new(&context, builtin_scene("cornell-box"), Some(0.9));
-        let mut method = prepare(
-            &context,
-            &fixture,
-            Settings {
-                bins: linklight::methods::antiradiance::BinCount::new(72).unwrap(),
-                half_tables: true,
-                refinement: 0.3,
-                ..settings(128)
-            },
+        let mut scene = builtin_scene("cornell-box");
+        (scene.materials[1].metallic, scene.materials[1].roughness) = (1.0, 0.3);
+        let mut fixture = Fixture::new(&context, scene, Some(0.9));
+        let pose = Pose::rest(&fixture.scene);
+        fixture.world =
+            World::new(&context, &fixture.scene, &fixture.geometry, &pose, &fixture.environment, false).unwrap();
+        let mut method = prepare(&context, &fixture, Settings { refinement: 0.3, ..settings(128) });
+        let transfer_windows = method.transfers().windows.len();
+        let counts = [method.tables().windows.len(), transfer_windows, method.links().parts().count()];
+        println!("{counts:?} windows of tables and of transfers, buffers of links");
+        let solution = crate::support::solve(&context, &mut method, &fixture, 2);
+        assert!(method.tables().gloss.count > 0);
+        let mut recorder = context.recorder("test").unwrap();
+        method.look(
+            &mut recorder,
+            &fixture.world,
+            &View::towards(Vec3::new(0.0, 1.0, 2.5), Vec3::Y, 0.8, UVec2::splat(64)),
         );
-        let windows = method.report().transfer_windows;
-        let parts = method.links().parts().count();
-        println!("{windows} windows, links in {parts} buffers");
-        ((windows, parts), crate::support::solve(&context, &mut method, &fixture, 2).indirect)
+        recorder.submit().unwrap();
+        (counts, solution.indirect, context.download(method.shown_irradiance().1).unwrap())
     };
-    // The queue of pairs is what needs the most otherwise.
-    let (whole, few) = (light(None), light(Some(900_000)));
-    assert_eq!(whole.0, (1, 1));
-    assert!(few.0.0 > 1 && few.0.1 > 1, "{:?} windows and buffers", few.0);
-    assert!(whole.1 == few.1);
+    // The list of cells is what needs the most otherwise.
+    let (whole, cut) = (light(None), light(Some(900_000)));
+    assert_eq!(whole.0, [1; 3]);
+    assert!(cut.0.iter().all(|&count| count > 1), "{:?} windows and buffers", cut.0);
+    assert!(whole.1 == cut.1 && whole.2 == cut.2);
+    assert!(whole.1 != whole.2, "gloss is seen");
 }

@@ -3,7 +3,7 @@
 use crate::common::TestContext;
 use crate::fixture::Fixture;
 use glam::Vec3;
-use linklight::methods::antiradiance::{Antiradiance, BinCount, Settings};
+use linklight::methods::antiradiance::{Antiradiance, BinCount, Settings, TableWindow, Tables};
 use linklight::stages::work::Unwatched;
 
 /// f32 tables, so that twins need not round; as the paper otherwise where a test does not say.
@@ -36,15 +36,19 @@ pub fn solve(context: &TestContext, method: &mut Antiradiance, fixture: &Fixture
 }
 
 /// A table of f32 entries, node by node.
-pub fn entries(context: &TestContext, words: &linklight::gpu::Buffer<u64>, bin_count: u32) -> Vec<Vec3> {
-    let words = context.download(words).unwrap();
+pub fn entries(
+    context: &TestContext,
+    tables: &Tables,
+    table: impl Fn(&TableWindow) -> &linklight::gpu::Buffer<u64>,
+) -> Vec<Vec3> {
+    let words = tables.download(context, table).unwrap();
     let halves = |word: u64| [word as u32, (word >> 32) as u32].map(f32::from_bits);
     let by_bin: Vec<Vec3> = words
         .chunks(2)
         .map(|pair| (halves(pair[0]), halves(pair[1])[0]))
         .map(|([r, g], b)| Vec3::new(r, g, b))
         .collect();
-    by_node(&by_bin, bin_count)
+    by_node(&by_bin, tables.bin_count)
 }
 
 /// A table that stands bin by bin, node by node (or leaf by leaf).

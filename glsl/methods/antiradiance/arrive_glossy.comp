@@ -4,7 +4,7 @@
 #include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 
-// One thread per (glossy leaf, bin): radiance that arrives along the bin, not far below zero.     [Dachsbacher2007 4.2 local pass]
+// One thread per (glossy leaf, bin of the tables' window): radiance that arrives along the bin, not far below zero.     [Dachsbacher2007 4.2 local pass]
 // reads glossy_leaves[glossy_count], leaves, nodes, bin_directions, means, peaks, incident (pushed down to the parents of leaves),
 // environment[BIN_COUNT], scales[2 leaf_count] (of what links bring)   writes arrived[glossy_count * BIN_COUNT] (W m^-2 sr^-1; words as the tables')   shared none
 layout(local_size_x = 64) in;
@@ -24,23 +24,28 @@ layout(push_constant, scalar) uniform Params {
     uint glossy_count;
     uint leaf_count;
     uint node_count;
+    uint first_bin;         // of the window
+    uint bin_count;
     float undershoot;
     uint add_environment;   // 1: what arrives is beside the environment's own light
 } params;
 
-vec3 beside(uint bin) { return params.add_environment != 0 ? environment[bin] : vec3(0.0); }
-
-#include "methods/antiradiance/glossy_arrival.glsl"
+#include "methods/antiradiance/floor.glsl"
+#include "methods/antiradiance/table.glsl"
 
 void main()
 {
     uint i = linear_index();
-    if (i >= params.glossy_count * BIN_COUNT) return;
-    uint leaf = glossy_leaves[i / BIN_COUNT], node = leaves[leaf].node, bin = i % BIN_COUNT;
+    if (i >= params.glossy_count * params.bin_count) return;
+    uint glossy = i / params.bin_count, in_window = i % params.bin_count, bin = params.first_bin + in_window;
+    uint leaf = glossy_leaves[glossy], node = leaves[leaf].node, parent = nodes[node].parent;
     // What travels against the normal arrives at the front.
-    bool at_front = dot(leaves[leaf].normal, BIN_DIRECTION(bin, BIN_COUNT)) <= 0.0;
+    bool at_front = dot(leaves[leaf].normal, BIN_DIRECTION(bin)) <= 0.0;
     uint side = 2 * leaf + (at_front ? 0 : 1);
-    vec3 value = glossy_arrival(leaf, node, nodes[node].parent, bin, means[side]);
+    vec3 value = LOAD_ENTRY(incident, entry_of(node, in_window, params.node_count));
+    if (parent != NONE) value += LOAD_ENTRY(incident, entry_of(parent, in_window, params.node_count));
+    if (params.add_environment != 0) value += environment[bin];
+    value = max(value, lowest_of(peaks[bin * params.leaf_count + leaf], means[side], params.undershoot));
     if (params.add_environment == 0) value *= scales[side];
-    STORE_ENTRY(arrived, i, value)
+    STORE_ENTRY(arrived, glossy * BIN_COUNT + bin, value)
 }

@@ -21,6 +21,6 @@ void main()
     float sum = 0.0;
     // Either side has the same sum: bins come in opposite pairs.
     for (uint bin = 0; bin < params.bin_count; ++bin)
-        sum += discrete_cosine(dot(normal, BIN_DIRECTION(bin, params.bin_count)), 1.0, params.bin_count);
+        sum += discrete_cosine(dot(normal, BIN_DIRECTION(bin)), 1.0, params.bin_count);
     cosine_norms[leaf] = float(params.bin_count) / (2.0 * sum);
 }

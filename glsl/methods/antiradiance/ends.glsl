@@ -46,12 +46,12 @@ uint bin_between(End p, End q, vec3 w, out vec3 v)
 {
     float p_cos = dot(p.normal, w), q_cos = dot(q.normal, w);
     uint middle = bin_of(w, params.bins.side);
-    v = BIN_DIRECTION(middle, params.bins.count);
+    v = BIN_DIRECTION(middle);
     if (is_between(p, q, v, p_cos, q_cos)) return middle;
     // Nearest of all is the bin itself.
     uint last = spread_offsets[middle + 1];
     for (uint k = spread_offsets[middle] + 1; k < last; ++k) {
-        v = BIN_DIRECTION(spread[k].bin, params.bins.count);
+        v = BIN_DIRECTION(spread[k].bin);
         if (is_between(p, q, v, p_cos, q_cos)) return spread[k].bin;
     }
     return NONE;

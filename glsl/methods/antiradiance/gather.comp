@@ -4,8 +4,8 @@
 #include "lib/hierarchy.glsl"
 
 // One thread per cell (a bin of a receiver) that anything reaches: incident radiance along its transfers.   [Dachsbacher2007 4.2 global pass]
-// reads work[] (cells by slices, or NONE), slice_offsets[slice_count + 1], transfers[window], exitant[bin_count * node_count]
-// (W m^-2 sr^-1: intensity per area)   writes incident[bin_count * node_count] (radiance, W m^-2 sr^-1)   shared none
+// reads work[] (cells by slices, or NONE), slice_offsets[slice_count + 1], transfers[window], exitant[window's bins * node_count]
+// (W m^-2 sr^-1: intensity per area)   writes incident[window's bins * node_count] (radiance, W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(set = 0, binding = 0, scalar) readonly buffer SliceOffsets { uint slice_offsets[]; };
@@ -14,8 +14,9 @@ layout(set = 0, binding = 2, scalar) readonly buffer Exitant { uint64_t exitant[
 layout(set = 0, binding = 3, scalar) writeonly buffer Incident { uint64_t incident[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer Work { uint work[]; };
 layout(push_constant, scalar) uniform Params {
-    uint first_slice;       // of the window
+    uint first_slice;       // of the window of transfers
     uint slice_count;
+    uint first_entry;       // of the tables' window
 } params;
 
 #include "methods/antiradiance/slices.glsl"
@@ -24,7 +25,7 @@ layout(push_constant, scalar) uniform Params {
 vec3 carried(uint k)
 {
     uvec2 transfer = unpackUint2x32(transfers[k]);
-    return uintBitsToFloat(transfer.y) * LOAD_ENTRY(exitant, transfer.x);
+    return uintBitsToFloat(transfer.y) * LOAD_ENTRY(exitant, transfer.x - params.first_entry);
 }
 
 void main()
@@ -39,5 +40,5 @@ void main()
         sum += carried(k) + carried(k + SLICE) + carried(k + 2 * SLICE) + carried(k + 3 * SLICE);
     for (; k < last; k += SLICE) sum += carried(k);
     uint cell = work[slice * SLICE + lane];
-    if (cell != NONE) STORE_ENTRY(incident, cell, sum);
+    if (cell != NONE) STORE_ENTRY(incident, cell - params.first_entry, sum);
 }

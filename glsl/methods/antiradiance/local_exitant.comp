@@ -6,7 +6,7 @@
 
 // One thread per leaf and few pairs of bins: reflected radiance, less antiradiance, which goes on where the light came from,
 // negated; but for what local_irradiance has sent.                               [Dachsbacher2007 4.2 local pass, Eqs. 18, 19]
-// reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
+// reads leaves, nodes, cosine_norms, bin_directions, incident[window's bins * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), radiosity[2 leaf_count] (W/m2), means[2 leaf_count] (W m^-2 sr^-1),
 //       glossy_of_leaf[leaf_count], specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)
 // updates peaks[BIN_COUNT * leaf_count] (of the mean), exitant (of leaves; intensity per area, W m^-2 sr^-1)
@@ -34,6 +34,7 @@ layout(set = 0, binding = 12, scalar) buffer ResidualParts { vec2 residual_parts
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint node_count;
+    uint first_bin;             // of the window
     uint sets_floor;            // 1: what arrives now, uncut, sets how far below zero later light may fall
     float undershoot;           // see floor.glsl
     float damping;              // share of the new exitant light; the rest stays as it was
@@ -54,7 +55,7 @@ void set_peak(uint at, vec3 arriving, vec3 mean)
 
 void main()
 {
-    uint leaf = gl_GlobalInvocationID.x, part = gl_WorkGroupID.y;
+    uint leaf = gl_GlobalInvocationID.x, part = part_of(gl_WorkGroupID.y);
     if (leaf >= params.leaf_count) return;
     uint flags = leaves[leaf].flags, glossy = glossy_of_leaf[leaf];
     bool plain = is_plain(flags, glossy);
@@ -64,8 +65,8 @@ void main()
     float norm = cosine_norms[leaf];
     if (plain) {
         for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
-            float cosine = dot(normal, BIN_DIRECTION(pair, BIN_COUNT));
-            uint entry = entry_of(node, leaving_bin(pair, cosine), params.node_count);
+            float cosine = dot(normal, BIN_DIRECTION(2 * pair));
+            uint entry = window_entry(node, leaving_bin(pair, cosine));
             STORE_ENTRY(exitant, entry, discrete_cosine(cosine, norm, BIN_COUNT) * l_front);
         }
         return;
@@ -78,7 +79,7 @@ void main()
     uint sides = params.sets_floor == 0 && (flags & REFLECTS_BEHIND) == 0 ? 1 : 2;
     vec2 residual = vec2(0.0);      // change, sum
     for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
-        float cosine = dot(normal, BIN_DIRECTION(pair, BIN_COUNT)), held = discrete_cosine(cosine, norm, BIN_COUNT);
+        float cosine = dot(normal, BIN_DIRECTION(2 * pair)), held = discrete_cosine(cosine, norm, BIN_COUNT);
         for (uint side = 0; side < sides; ++side) {
             bool leaves_front = side == 0;
             uint bin = leaves_front ? leaving_bin(pair, cosine) : arriving_bin(pair, cosine);
@@ -96,7 +97,7 @@ void main()
                 else arriving = max(arriving, lowest_of(peaks[at], mean, params.undershoot));
                 radiance -= arriving;
             }
-            SEND(entry_of(node, bin, params.node_count), held * radiance, residual)
+            SEND(window_entry(node, bin), held * radiance, residual)
         }
     }
     residual_parts[part * params.leaf_count + leaf] += leaves[leaf].area * (4.0 * PI / float(BIN_COUNT)) * residual;

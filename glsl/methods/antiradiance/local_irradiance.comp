@@ -6,7 +6,7 @@
 
 // One thread per leaf and few pairs of bins: irradiance of both sides; and what arrives at fronts leaves backs that reflect nothing as
 // antiradiance, here, where it is at hand: these passes wait for memory.          [Dachsbacher2007 4.2 local pass, Eq. 19]
-// reads leaves, nodes, cosine_norms, bin_directions, incident[BIN_COUNT * node_count] (pushed down to the parents of leaves),
+// reads leaves, nodes, cosine_norms, bin_directions, incident[window's bins * node_count] (pushed down to the parents of leaves),
 //       environment[BIN_COUNT] (W m^-2 sr^-1), means[2 leaf_count] (W m^-2 sr^-1), peaks[BIN_COUNT * leaf_count] (of the mean)
 // updates exitant (of leaves; intensity per area, W m^-2 sr^-1)
 // writes parts[part_count * 2 * leaf_count] (W/m2, fronts and backs of some pairs one after the other),
@@ -29,6 +29,7 @@ layout(set = 0, binding = 10, scalar) writeonly buffer ResidualParts { vec2 resi
 layout(push_constant, scalar) uniform Params {
     uint leaf_count;
     uint node_count;
+    uint first_bin;             // of the window
     uint sets_floor;            // 1: what arrives now counts uncut, see floor.glsl; nothing is sent yet
     float undershoot;
     float damping;              // share of the new exitant light; the rest stays as it was
@@ -47,7 +48,7 @@ vec3 held_in(HierarchyLeaf own, uint leaf, uint parent, uint bin, vec3 mean, flo
 
 void main()
 {
-    uint leaf = gl_GlobalInvocationID.x, part = gl_WorkGroupID.y;
+    uint leaf = gl_GlobalInvocationID.x, part = part_of(gl_WorkGroupID.y);
     if (leaf >= params.leaf_count) return;
     HierarchyLeaf own = leaves[leaf];
     uint parent = nodes[own.node].parent;
@@ -61,11 +62,11 @@ void main()
     vec3 front = vec3(0.0), back = vec3(0.0);
     vec2 residual = vec2(0.0);      // change, sum
     for (uint pair = part * PAIRS_A_THREAD; pair < pairs_end(part); ++pair) {
-        float cosine = dot(own.normal, BIN_DIRECTION(pair, BIN_COUNT)), held = discrete_cosine(cosine, norm, BIN_COUNT);
+        float cosine = dot(own.normal, BIN_DIRECTION(2 * pair)), held = discrete_cosine(cosine, norm, BIN_COUNT);
         uint bin = arriving_bin(pair, cosine);
         vec3 arriving = held_in(own, leaf, parent, bin, mean_front, held);
         front += arriving;
-        if (sends) SEND(entry_of(own.node, bin, params.node_count), -arriving, residual)
+        if (sends) SEND(window_entry(own.node, bin), -arriving, residual)
         if (needs_back) back += held_in(own, leaf, parent, leaving_bin(pair, cosine), means[2 * leaf + 1], held);
     }
     residual_parts[part * params.leaf_count + leaf] = own.area * bin_solid_angle * residual;

@@ -5,7 +5,7 @@
 
 // One thread per inner node of one level and few bins: exitant intensity per area from the children's.
 //                                                                                               [Dachsbacher2007 4.2 pull]
-// reads level_nodes, nodes   updates exitant[bin_count * node_count] (W m^-2 sr^-1); the level below is already done   shared none
+// reads level_nodes, nodes   updates exitant[window's bins * node_count] (W m^-2 sr^-1); the level below is already done   shared none
 // Differs from [Dachsbacher2007]: per area, a mean in place of a sum, so that f16 has digits for small and large nodes alike.
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)

@@ -4,7 +4,7 @@
 #include "lib/hierarchy.glsl"
 
 // One thread per inner node of one level and few bins: adds what the parent received.       [Dachsbacher2007 4.2 push]
-// reads level_nodes, nodes   updates incident[bin_count * node_count] (W m^-2 sr^-1); the level above is already done   shared none
+// reads level_nodes, nodes   updates incident[window's bins * node_count] (W m^-2 sr^-1); the level above is already done   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(set = 0, binding = 0, scalar) readonly buffer LevelNodes { uint level_nodes[]; };

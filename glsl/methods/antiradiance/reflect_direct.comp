@@ -60,7 +60,7 @@ void main()
     if (i >= params.glossy_count * BIN_COUNT) return;
     uint leaf = glossy_leaves[i / BIN_COUNT];
     HierarchyLeaf own = leaves[leaf];
-    vec3 w = BIN_DIRECTION(i % BIN_COUNT, BIN_COUNT);
+    vec3 w = BIN_DIRECTION(i % BIN_COUNT);
     bool leaves_front = dot(own.normal, w) > 0.0;
     if (!leaves_front && own.back_element == NONE) return;
     Surface s = glossy_surface(gloss[leaf], leaves_front ? own.normal : -own.normal);

@@ -7,7 +7,7 @@
 #include "lib/specular_albedo.glsl"
 
 // One thread per (glossy leaf, few bins): radiance that its specular lobe sends along those bins: what `glossy_radiance` (in
-// gloss.glsl) sums for one direction.                                              [Dachsbacher2007 4.2 local pass, Eq. 18]
+// to_eye.comp) sums for one direction.                                              [Dachsbacher2007 4.2 local pass, Eq. 18]
 // reads glossy_leaves[glossy_count], leaves, gloss, cosine_norms, bin_directions, arrived[glossy_count * BIN_COUNT] (W m^-2 sr^-1),
 // base[glossy_count * BIN_COUNT] (what is sent in any case)   writes specular[glossy_count * BIN_COUNT] (W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
@@ -26,8 +26,10 @@ layout(push_constant, scalar) uniform Params { uint glossy_count; } params;
 #include "methods/antiradiance/glossy_surface.glsl"
 #include "methods/antiradiance/table.glsl"
 
-// Bins of a thread: each direction that light comes from, and what comes, is loaded once for all.
+// Bins of a thread: each direction that light comes from, and what comes, is loaded once for all. First those that look up,
+// then their opposites: together they mostly lie on one side of a surface.
 const uint SENT_BINS = 8;
+uint sent_bin(uint index) { return index < BIN_COUNT / 2 ? 2 * index : 2 * index - BIN_COUNT + 1; }
 
 // A direction that light is sent along, and what is summed up for it.
 struct Sent {
@@ -43,7 +45,7 @@ void main()
     const uint groups = BIN_COUNT / SENT_BINS;
     uint i = linear_index();
     if (i >= params.glossy_count * groups) return;
-    uint glossy = i / groups, leaf = glossy_leaves[glossy], first = glossy * BIN_COUNT + i % groups * SENT_BINS;
+    uint glossy = i / groups, leaf = glossy_leaves[glossy], first = i % groups * SENT_BINS;
     vec3 normal = leaves[leaf].normal;
     float norm = cosine_norms[leaf];
     Surface s = glossy_surface(gloss[leaf], normal);
@@ -52,7 +54,7 @@ void main()
 
     Sent sent[SENT_BINS];
     [[unroll]] for (uint k = 0; k < SENT_BINS; ++k) {
-        vec3 w = BIN_DIRECTION(first % BIN_COUNT + k, BIN_COUNT);
+        vec3 w = BIN_DIRECTION(sent_bin(first + k));
         float cosine = dot(normal, w);
         sent[k] = Sent(w - cosine * normal, max(abs(cosine), 1e-6), smith_root(max(abs(cosine), 1e-6), s.alpha),
                        cosine > 0.0 ? 1.0 : -1.0, vec3(0.0), vec3(0.0), vec2(0.0));
@@ -60,12 +62,12 @@ void main()
     bool any_sent = sides == 2;
     [[unroll]] for (uint k = 0; k < SENT_BINS; ++k) any_sent = any_sent || sent[k].side > 0.0;
     for (uint pair = 0; any_sent && pair < BIN_COUNT / 2; ++pair) {
-        vec3 w = BIN_DIRECTION(pair, BIN_COUNT);
+        vec3 w = BIN_DIRECTION(2 * pair);
         for (uint side = 0; side < sides; ++side) {
             // Towards where the light comes from: to the front's side of the surface, then to the back's.
             bool is_front = side == 0, is_opposite = dot(normal, w) > 0.0 == is_front;
             vec3 to_light = is_opposite ? w : -w;
-            uint bin = is_opposite ? opposite_bin(pair, BIN_COUNT) : pair;
+            uint bin = 2 * pair + (is_opposite ? 1 : 0);
             vec3 arriving = LOAD_ENTRY(arrived, glossy * BIN_COUNT + bin);
             float signed_cosine = dot(normal, to_light), cosine = abs(signed_cosine), root = smith_root(cosine, s.alpha);
             float held = discrete_cosine(cosine, norm, BIN_COUNT) * (0.5 * a / PI);
@@ -88,6 +90,7 @@ void main()
         vec3 rise = vec3(s.f90) - s.f0;
         vec3 within = (s.f0 * sent[k].even + rise * sent[k].steep) / max(s.f0 * sent[k].weights.x + rise * sent[k].weights.y, vec3(1e-20));
         vec3 value = max(specular_albedo(s, sent[k].cosine) * within, vec3(0.0));
-        specular[first + k] = base[first + k] + value;
+        uint at = glossy * BIN_COUNT + sent_bin(first + k);
+        specular[at] = base[at] + value;
     }
 }

@@ -8,7 +8,7 @@
 // memory's prefetching follows all their stretches of the table.
 const uint BINS_A_THREAD = 8;
 
-// Where a table of `node_count` nodes has a bin of a node.
+// Where a table of `node_count` nodes has a bin of a node, counted from the table's first.
 uint entry_of(uint node, uint bin, uint node_count) { return bin * node_count + node; }
 
 vec3 entry_of_words(uint64_t first, uint64_t second)

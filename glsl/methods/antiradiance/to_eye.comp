@@ -1,40 +1,58 @@
 #version 460
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #include "lib/prelude.glsl"
-#include "lib/element.glsl"
+#include "lib/direction_bins.glsl"
 #include "lib/hierarchy.glsl"
 #include "lib/leaf_gloss.glsl"
+#include "lib/specular_albedo.glsl"
 
 // One thread per glossy leaf: the irradiance that, reflected evenly as the display does, gives what its specular lobe sends
 // to the eye besides its diffuse light.
-// reads glossy_leaves[glossy_count], leaves, nodes, gloss, cosine_norms, bin_directions, means, peaks, incident, positions,
-// scales[2 leaf_count] (of what links bring), albedo, members, back_elements[vertex_count],
-// irradiance[element_count] (W/m2)   updates shown[element_count] (W/m2; of glossy leaves)   shared none
+// reads glossy_leaves[glossy_count], leaves, gloss, cosine_norms, bin_directions, arrived[glossy_count * BIN_COUNT]
+// (W m^-2 sr^-1), positions, albedo, members, back_elements[vertex_count], irradiance[element_count] (W/m2)
+// updates shown[element_count] (W/m2; of glossy leaves)   shared none
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint WORDS = 2;    // of 64 bits an entry of the tables: 2 (f32) or 1 (f16)
 layout(constant_id = 1) const uint BIN_COUNT = 128;
 layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Leaves { HierarchyLeaf leaves[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer Nodes { HierarchyNode nodes[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
-layout(set = 0, binding = 5, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
-layout(set = 0, binding = 6, scalar) readonly buffer Means { vec3 means[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Incident { uint64_t incident[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer Positions { vec3 positions[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer Albedo { vec3 albedo[]; };
-layout(set = 0, binding = 10, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
-layout(set = 0, binding = 11, scalar) writeonly buffer Shown { vec3 shown[]; };
-layout(set = 0, binding = 12, scalar) readonly buffer Peaks { float peaks[]; };
-layout(set = 0, binding = 13, scalar) readonly buffer Members { uint members[]; };
-layout(set = 0, binding = 14, scalar) readonly buffer BackElements { uint back_elements[]; };
-layout(set = 0, binding = 15, scalar) readonly buffer Scales { float scales[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer Gloss { LeafGloss gloss[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer CosineNorms { float cosine_norms[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer BinDirections { uint64_t bin_directions[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer Arrived { uint64_t arrived[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer Albedo { vec3 albedo[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer Irradiance { vec3 irradiance[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer Shown { vec3 shown[]; };
+layout(set = 0, binding = 10, scalar) readonly buffer Members { uint members[]; };
+layout(set = 0, binding = 11, scalar) readonly buffer BackElements { uint back_elements[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0.
-layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; uint leaf_count; uint node_count; float undershoot; } params;
+layout(push_constant, scalar) uniform Params { vec4 eye; uint glossy_count; } params;
 
-#include "methods/antiradiance/gloss.glsl"
+#include "methods/antiradiance/glossy_surface.glsl"
+#include "methods/antiradiance/table.glsl"
 
-vec3 beside(uint bin) { return vec3(0.0); }
+// Radiance reflected towards `to_eye`: the lobe's albedo times the mean of what arrives within it, so that the sum over
+// few bins neither makes nor loses light.                                                        [Dachsbacher2007 Eq. 18]
+vec3 glossy_radiance(uint glossy, uint leaf, vec3 to_eye)
+{
+    HierarchyLeaf own = leaves[leaf];
+    float side = dot(own.normal, to_eye) > 0.0 ? 1.0 : -1.0;
+    if (side < 0.0 && (own.flags & REFLECTS_BEHIND) == 0) return vec3(0.0);
+    vec3 normal = side * own.normal;
+    Surface s = glossy_surface(gloss[leaf], normal);
+
+    vec3 sum = vec3(0.0), weights = vec3(0.0);
+    for (uint bin = 0; bin < BIN_COUNT; ++bin) {
+        vec3 w = BIN_DIRECTION(bin);
+        float cosine = dot(normal, w);
+        if (cosine > 0.0) continue;
+        vec3 weight = discrete_cosine(cosine, cosine_norms[leaf], BIN_COUNT) * brdf_value(s, to_eye, -w);
+        sum += weight * LOAD_ENTRY(arrived, glossy * BIN_COUNT + bin);
+        weights += weight;
+    }
+    return max(specular_albedo(s, dot(normal, to_eye)) * sum / max(weights, vec3(1e-20)), vec3(0.0));
+}
 
 void main()
 {
@@ -50,7 +68,7 @@ void main()
     Surface s = glossy_surface(gloss[leaf], sees_front ? normal : -normal);
     s.alpha = gloss[leaf].alpha;
     float cos_eye = dot(s.normal, to_eye);
-    vec3 glossy = PI * glossy_radiance(leaf, to_eye);
+    vec3 glossy = PI * glossy_radiance(i, leaf, to_eye);
     uint first = leaves[leaf].first_member, last = first + leaves[leaf].member_count;
     for (uint member = first; member < last; ++member) {
         uint element = sees_front ? members[member] : back_elements[members[member]];

@@ -111,7 +111,7 @@ void transfers_of(uint sender, uint receiver, End q, End p)
     // The bin that a Gaussian reads: the nearest one on the sender's side.
     uint read_bin = NONE;
     for (uint k = first; k < last; ++k) {
-        vec3 v = BIN_DIRECTION(spread[k].bin, params.bins.count);
+        vec3 v = BIN_DIRECTION(spread[k].bin);
         if (q.is_flat && dot(q.normal, v) * q_cos <= 0.0) continue;
         if (read_bin == NONE) read_bin = spread[k].bin;
         if (!(p.passes_behind && dot(p.normal, v) >= 0.0)) found += 1;
@@ -121,14 +121,14 @@ void transfers_of(uint sender, uint receiver, End q, End p)
     transfers_follow(found);
     for (uint k = first; k < last; ++k) {
         uint bin = spread[k].bin;
-        vec3 v = BIN_DIRECTION(bin, params.bins.count);
+        vec3 v = BIN_DIRECTION(bin);
         if ((q.is_flat && dot(q.normal, v) * q_cos <= 0.0) || (p.passes_behind && dot(p.normal, v) >= 0.0)) continue;
         float weight = coverage * spread[k].weight / total;
         if (params.bins.is_gaussian == 0) {
             read_bin = bin;
             if (q.is_flat) weight = min(weight, 1.0);
         } else {
-            v = BIN_DIRECTION(read_bin, params.bins.count);
+            v = BIN_DIRECTION(read_bin);
         }
         if (q.is_flat) weight /= discrete_cosine(dot(q.normal, v), q.norm, params.bins.count);
         transfer(receiver, bin, sender, read_bin, weight);

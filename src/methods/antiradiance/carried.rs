@@ -13,15 +13,18 @@ use std::f32::consts::PI;
 
 /// What the last step gathered from, which it replaced.
 pub(super) struct Kept {
-    pub exitant: Buffer<u64>,
+    /// Window by window.
+    pub exitant: Vec<Buffer<u64>>,
     pub step: LocalStep,
 }
 
 impl Antiradiance {
     /// Lets steps keep what they send (for [`Self::carried_to`]), or no longer: a third table.
     pub fn keep_sent(&mut self, context: &Context, keeps: bool) -> Result<(), GpuError> {
-        let exitant = || context.buffer("antiradiance/sent", self.tables.exitant.len());
-        let kept = keeps.then(exitant).transpose()?;
+        let windows = self.tables.windows.iter().zip(0..);
+        let exitant =
+            windows.map(|(window, index)| context.buffer(&format!("antiradiance/sent {index}"), window.exitant.len()));
+        let kept = keeps.then(|| exitant.collect::<Result<_, GpuError>>()).transpose()?;
         self.kept = kept.map(|exitant| Kept { exitant, step: LocalStep::default() });
         Ok(())
     }
@@ -44,7 +47,8 @@ impl Antiradiance {
             }
         }
         self.transfers.of_cells(context, &mut cells)?;
-        let (sent, incident) = (context.download(&kept.exitant)?, context.download(&self.tables.incident)?);
+        let sent = kept.exitant.iter().map(|window| context.download(window)).collect::<Result<Vec<_>, _>>()?.concat();
+        let incident = self.tables.download(context, |window| &window.incident)?;
         let (means, peaks) = (context.download(&self.tables.means)?, context.download(&self.tables.peaks)?);
         let (leaves, norms) = (context.download(&self.hierarchy.leaves)?, context.download(&self.tables.cosine_norms)?);
         let scales = context.download(&self.tables.scales)?;

@@ -84,26 +84,7 @@ impl Gloss {
         bounces: f32,
     ) {
         let (words, bin_count) = (Tables::words(tables.half) as u32, tables.bin_count);
-        let arrive = passes::ArriveGlossy {
-            glossy_leaves: &self.leaves,
-            leaves: &hierarchy.leaves,
-            nodes: &hierarchy.nodes,
-            bin_directions: &bins.directions,
-            means: &tables.means,
-            peaks: &tables.peaks,
-            incident: &tables.incident,
-            environment: &tables.environment,
-            scales: &tables.scales,
-            arrived: &self.arrived,
-            constants: passes::ArriveGlossyConstants { words, bin_count },
-            params: passes::ArriveGlossyParams {
-                glossy_count: self.count,
-                leaf_count: hierarchy.leaf_count(),
-                node_count: hierarchy.node_count(),
-                undershoot: bounces * tables.undershoot,
-                add_environment: u32::from(has_environment),
-            },
-        };
+        self.arrive(recorder, tables, hierarchy, bins, has_environment, bounces);
         let reflect = passes::ReflectGlossy {
             glossy_leaves: &self.leaves,
             leaves: &hierarchy.leaves,
@@ -116,8 +97,48 @@ impl Gloss {
             constants: passes::ReflectGlossyConstants { words, bin_count },
             params: passes::ReflectGlossyParams { glossy_count: self.count },
         };
-        recorder.dispatch(&arrive, self.count * bin_count);
         recorder.dispatch(&reflect, self.count * (bin_count / SENT_BINS));
+    }
+
+    /// What arrived last, in one table.
+    fn arrive(
+        &self,
+        recorder: &mut Recorder<'_>,
+        tables: &Tables,
+        hierarchy: &Hierarchy,
+        bins: &DeviceBins,
+        has_environment: bool,
+        bounces: f32,
+    ) {
+        for window in &tables.windows {
+            let bin_count = window.bins.len() as u32;
+            let pass = passes::ArriveGlossy {
+                glossy_leaves: &self.leaves,
+                leaves: &hierarchy.leaves,
+                nodes: &hierarchy.nodes,
+                bin_directions: &bins.directions,
+                means: &tables.means,
+                peaks: &tables.peaks,
+                incident: &window.incident,
+                environment: &tables.environment,
+                scales: &tables.scales,
+                arrived: &self.arrived,
+                constants: passes::ArriveGlossyConstants {
+                    words: Tables::words(tables.half) as u32,
+                    bin_count: tables.bin_count,
+                },
+                params: passes::ArriveGlossyParams {
+                    glossy_count: self.count,
+                    leaf_count: hierarchy.leaf_count(),
+                    node_count: hierarchy.node_count(),
+                    first_bin: window.bins.start,
+                    bin_count,
+                    undershoot: bounces * tables.undershoot,
+                    add_environment: u32::from(has_environment),
+                },
+            };
+            recorder.dispatch(&pass, self.count * bin_count);
+        }
     }
 }
 
@@ -193,17 +214,14 @@ impl Antiradiance {
             Lens::Orthographic { .. } => (-view.forward).extend(0.0),
         };
         let (tables, gloss) = (&self.tables, &self.tables.gloss);
+        gloss.arrive(recorder, tables, &self.hierarchy, &self.bins, false, self.bounced);
         let pass = passes::ToEye {
             glossy_leaves: &gloss.leaves,
             leaves: &self.hierarchy.leaves,
-            nodes: &self.hierarchy.nodes,
             gloss: &gloss.lobes,
             cosine_norms: &tables.cosine_norms,
             bin_directions: &self.bins.directions,
-            means: &tables.means,
-            peaks: &tables.peaks,
-            incident: &tables.incident,
-            scales: &tables.scales,
+            arrived: &gloss.arrived,
             positions: &world.positions,
             albedo: &self.elements.albedo,
             irradiance: self.indirect_irradiance(),
@@ -211,13 +229,7 @@ impl Antiradiance {
             back_elements: &self.elements.back_elements,
             shown,
             constants: passes::ToEyeConstants { words: Tables::words(tables.half) as u32, bin_count: tables.bin_count },
-            params: passes::ToEyeParams {
-                eye: eye.to_array(),
-                glossy_count: gloss.count,
-                leaf_count: self.hierarchy.leaf_count(),
-                node_count: self.hierarchy.node_count(),
-                undershoot: self.bounced * tables.undershoot,
-            },
+            params: passes::ToEyeParams { eye: eye.to_array(), glossy_count: gloss.count },
         };
         recorder.dispatch(&pass, gloss.count);
         let (elements, emitters) = (&self.elements, &self.emitters);

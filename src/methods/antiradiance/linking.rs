@@ -129,7 +129,9 @@ impl Transfers {
         let padded = u64::from(offsets[slice_count as usize]);
         check_transfers(padded, available)?;
         let ends: Vec<u32> = bin_slices.iter().map(|&slice| offsets[slice as usize]).collect();
-        for bins in plan_windows(&ends, context.limits().storage_buffer_bytes / TRANSFER_BYTES)? {
+        let largest = context.limits().storage_buffer_bytes;
+        let table_bins = Tables::window_bins(node_count, settings.half_tables, largest).unwrap_or(bin_count);
+        for bins in plan_windows(&ends, largest / TRANSFER_BYTES, table_bins)? {
             let [first, end] = [bins.start, bins.end].map(|bin| ends[bin as usize]);
             let name = format!("antiradiance/transfers {}", result.windows.len());
             let window = TransferWindow {
@@ -144,19 +146,29 @@ impl Transfers {
         Ok(result)
     }
 
-    /// `incident` from `exitant` along all transfers.                       [Dachsbacher2007 4.2, global pass]
-    pub fn gather(&self, recorder: &mut Recorder<'_>, half: bool, exitant: &Buffer<u64>, incident: &Buffer<u64>) {
-        recorder.fill(incident, 0);
+    /// Incident from exitant light along all transfers.                       [Dachsbacher2007 4.2, global pass]
+    pub fn gather(&self, recorder: &mut Recorder<'_>, tables: &Tables) {
+        for table in &tables.windows {
+            recorder.fill(&table.incident, 0);
+        }
         for window in &self.windows {
+            // Windows of transfers lie within those of the tables.
+            let Some(table) = tables.windows.iter().find(|table| table.bins.contains(&window.bins.start)) else {
+                continue;
+            };
             let (first_slice, slice_count) = (window.slices.start, window.slices.len() as u32);
             let pass = passes::Gather {
                 slice_offsets: &self.slice_offsets,
                 transfers: &window.transfers,
                 work: &self.work,
-                exitant,
-                incident,
-                constants: passes::GatherConstants { words: Tables::words(half) as u32 },
-                params: passes::GatherParams { first_slice, slice_count },
+                exitant: &table.exitant,
+                incident: &table.incident,
+                constants: passes::GatherConstants { words: Tables::words(tables.half) as u32 },
+                params: passes::GatherParams {
+                    first_slice,
+                    slice_count,
+                    first_entry: table.bins.start * self.node_count,
+                },
             };
             recorder.dispatch(&pass, slice_count * SLICE);
         }
@@ -398,8 +410,9 @@ fn check_transfers(count: u64, available: u64) -> Result<(), LinkingError> {
     Ok(())
 }
 
-/// Ranges of bins whose transfers (`ends`: where each bin's start, one more) fit into `largest`.
-fn plan_windows(ends: &[u32], largest: u64) -> Result<Vec<Range<u32>>, LinkingError> {
+/// Ranges of bins whose transfers (`ends`: where each bin's start, one more) fit into `largest`, and whose light lies in one
+/// window of the tables, of `table_bins`.
+fn plan_windows(ends: &[u32], largest: u64, table_bins: u32) -> Result<Vec<Range<u32>>, LinkingError> {
     let count_of = |bins: &Range<u32>| u64::from(ends[bins.end as usize] - ends[bins.start as usize]);
     let bin_count = ends.len() as u32 - 1;
     let (mut windows, mut first) = (Vec::new(), 0);
@@ -408,7 +421,8 @@ fn plan_windows(ends: &[u32], largest: u64) -> Result<Vec<Range<u32>>, LinkingEr
         if count_of(&own) > largest {
             return Err(LinkingError::TooMany(count_of(&own)));
         }
-        while own.end < bin_count && count_of(&(first..own.end + 1)) <= largest {
+        let table_end = (first / table_bins + 1).saturating_mul(table_bins).min(bin_count);
+        while own.end < table_end && count_of(&(first..own.end + 1)) <= largest {
             own.end += 1;
         }
         first = own.end;
@@ -429,8 +443,9 @@ mod tests {
         assert_eq!(bin_slices, [0, 3, 3, 4]);
         assert_eq!((starts[0], starts[1], starts[5], starts[6]), (0, 33, 33, 73));
         assert_eq!(starts[2 * (LENGTH_CLASSES + 1) + 1], 3 * SLICE);
-        assert_eq!(plan_windows(&[0, 10, 20, 45], 25).unwrap(), [0..2, 2..3]);
-        assert_eq!(plan_windows(&[0, 10, 20, 45], 100).unwrap(), vec![0..3]);
-        assert!(matches!(plan_windows(&[0, 10, 20, 45], 24), Err(LinkingError::TooMany(25))));
+        assert_eq!(plan_windows(&[0, 10, 20, 45], 25, 8).unwrap(), [0..2, 2..3]);
+        assert_eq!(plan_windows(&[0, 10, 20, 45, 50], 100, 2).unwrap(), [0..2, 2..4]);
+        assert_eq!(plan_windows(&[0, 10, 20, 45], 100, u32::MAX).unwrap(), vec![0..3]);
+        assert!(matches!(plan_windows(&[0, 10, 20, 45], 24, 8), Err(LinkingError::TooMany(25))));
     }
 }

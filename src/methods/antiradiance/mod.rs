@@ -56,7 +56,7 @@ pub use links::{NodeLinks, link_solid_angle};
 pub use report::Report;
 pub use scheme::{Residual, growth_rate};
 pub use settings::{Backs, Leaves, Scheme, Settings};
-pub use tables::{LocalStep, Tables, binned};
+pub use tables::{LocalStep, TableWindow, Tables, binned};
 pub use views::{DebugView, half};
 
 pub use super::explicit_visibility::Stage;
@@ -438,8 +438,11 @@ fn check_memory(
     let table = Tables::table_bytes(nodes as u32, bins, half);
     let cells = 4 * (nodes * u64::from(bins) + 1);
     let largest = context.limits().storage_buffer_bytes;
-    if table.max(cells) > largest || nodes * u64::from(bins) > u64::from(u32::MAX) {
-        return refuse("one table", table.max(cells), largest);
+    if cells > largest || cells > 4 * u64::from(u32::MAX) {
+        return refuse("a list of cells", cells, largest.min(4 * u64::from(u32::MAX)));
+    }
+    if Tables::window_bins(nodes as u32, half, largest).is_none() {
+        return refuse("a window of eight bins", Tables::table_bytes(nodes as u32, 8, half), largest);
     }
     let needed = 2 * table + cells;
     let available = budget.min(context.available_bytes());

@@ -224,7 +224,9 @@ impl Antiradiance {
     fn step_once(&mut self, context: &Context, bounce: u32, step: LocalStep) -> Result<Residual, AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         if let Some(kept) = &mut self.kept {
-            recorder.copy(&self.tables.exitant, &kept.exitant);
+            for (window, sent) in self.tables.windows.iter().zip(&kept.exitant) {
+                recorder.copy(&window.exitant, sent);
+            }
             kept.step = step;
         }
         recorder.scope(format_args!("bounce {bounce}"), |recorder| {

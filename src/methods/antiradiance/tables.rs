@@ -9,22 +9,35 @@ use crate::stages::direction_bins::{DeviceBins, DirectionBins};
 use crate::stages::elements::Elements;
 use crate::stages::hierarchy::Hierarchy;
 use glam::{Vec2, Vec3};
+use std::ops::Range;
 
-/// Bins of one thread, in `table.glsl`.
+/// Bins of one thread, in `table.glsl`; as pairs of opposite ones in `local.glsl`.
 const BINS_A_THREAD: u32 = 8;
-/// Pairs of opposite bins of one thread, in `local.glsl`.
-const PAIRS_A_THREAD: u32 = 4;
 
-/// Light by direction and node, and by leaf and side. Entry of a table: `bin * nodes + node`, [`Tables::words`] words of 64
-/// bits.
-pub struct Tables {
-    pub bin_count: u32,
-    /// Entries are three f16, else three f32.
-    pub half: bool,
+/// The light on the nodes in consecutive bins: as many as one buffer holds. Entry: `bin * nodes + node`, bins counted from the
+/// window's first, [`Tables::words`] words of 64 bits.
+pub struct TableWindow {
+    pub bins: Range<u32>,
     /// Intensity per area, radiance times cosine: reflected and emitted light less antiradiance, W m^-2 sr^-1.
     pub exitant: Buffer<u64>,
     /// Radiance, W m^-2 sr^-1. A leaf lacks what stands with its parent.
     pub incident: Buffer<u64>,
+}
+
+impl TableWindow {
+    /// Threads that share the bins of a node or leaf.
+    fn parts(&self) -> u32 {
+        self.bins.len() as u32 / BINS_A_THREAD
+    }
+}
+
+/// Light by direction and node, and by leaf and side.
+pub struct Tables {
+    pub bin_count: u32,
+    /// Entries are three f16, else three f32.
+    pub half: bool,
+    /// All bins, in order.
+    pub windows: Vec<TableWindow>,
     /// How far below zero the light of a bin may fall, of its side's mean.
     pub undershoot: f32,
     /// Per bin: radiance of the environment that travels along it.
@@ -87,6 +100,24 @@ impl Tables {
         if half { 1 } else { 2 }
     }
 
+    /// Bins of each window but the last, where one buffer holds at most `largest` bytes; `None` where not even the bins of one
+    /// thread fit.
+    pub fn window_bins(node_count: u32, half: bool, largest: u64) -> Option<u32> {
+        let bins = largest / Self::table_bytes(node_count, 1, half).max(1) / u64::from(BINS_A_THREAD);
+        let bins = bins.min(u64::from(u32::MAX / BINS_A_THREAD)) as u32 * BINS_A_THREAD;
+        (bins > 0).then_some(bins)
+    }
+
+    /// All of what nodes send, or of what they receive, as if it were one window.
+    pub fn download(
+        &self,
+        context: &Context,
+        table: impl Fn(&TableWindow) -> &Buffer<u64>,
+    ) -> Result<Vec<u64>, GpuError> {
+        let windows = self.windows.iter().map(|window| context.download(table(window)));
+        Ok(windows.collect::<Result<Vec<_>, _>>()?.concat())
+    }
+
     /// Bytes of one of the two large tables.
     pub fn table_bytes(node_count: u32, bin_count: u32, half: bool) -> u64 {
         u64::from(node_count) * u64::from(bin_count) * 8 * Self::words(half)
@@ -102,16 +133,26 @@ impl Tables {
         gloss: Gloss,
     ) -> Result<Self, GpuError> {
         let bin_count = bins.bins.count();
-        let words = (Self::table_bytes(hierarchy.node_count(), bin_count, half) / 8) as usize;
+        let nodes = hierarchy.node_count();
+        // One thread's bins at least: what does not fit is refused where it is allocated.
+        let wanted = Self::window_bins(nodes, half, context.limits().storage_buffer_bytes).unwrap_or(BINS_A_THREAD);
+        let windows = (0..bin_count).step_by(wanted as usize).zip(0..).map(|(first, index)| {
+            let bins = first..bin_count.min(first.saturating_add(wanted));
+            let words = (Self::table_bytes(nodes, bins.len() as u32, half) / 8) as usize;
+            Ok(TableWindow {
+                exitant: context.buffer(&format!("antiradiance/exitant {index}"), words)?,
+                incident: context.buffer(&format!("antiradiance/incident {index}"), words)?,
+                bins,
+            })
+        });
         let (leaves, sides) = (hierarchy.leaf_count() as usize, 2 * hierarchy.leaf_count() as usize);
-        let parts = part_count(bin_count) as usize;
+        let parts = (bin_count / BINS_A_THREAD) as usize;
         Ok(Self {
             bin_count,
             half,
             undershoot,
             gloss,
-            exitant: context.buffer("antiradiance/exitant", words)?,
-            incident: context.buffer("antiradiance/incident", words)?,
+            windows: windows.collect::<Result<_, GpuError>>()?,
             environment: context.upload("antiradiance/environment", &binned(environment, &bins.bins))?,
             is_environment_black: environment.is_black(),
             cosine_norms: context.buffer("antiradiance/cosine norms", leaves)?,
@@ -159,8 +200,10 @@ impl Tables {
 
     /// Starts over: no light has been transported yet, leaves send their sources.
     pub fn start(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, has_environment: bool) {
-        recorder.fill(&self.incident, 0);
-        recorder.fill(&self.exitant, 0);
+        for window in &self.windows {
+            recorder.fill(&window.incident, 0);
+            recorder.fill(&window.exitant, 0);
+        }
         recorder.fill(&self.means, 0);
         recorder.fill(&self.peaks, 0);
         recorder.copy(&self.gloss.base, &self.gloss.specular);
@@ -177,7 +220,7 @@ impl Tables {
         step: LocalStep,
     ) {
         recorder.scope("global", |recorder| {
-            transfers.gather(recorder, self.half, &self.exitant, &self.incident);
+            transfers.gather(recorder, self);
         });
         recorder.scope("push", |recorder| self.push(recorder, hierarchy));
         self.local(recorder, hierarchy, bins, step);
@@ -200,22 +243,30 @@ impl Tables {
             if level.start == 0 {
                 return; // the root has no parent
             }
-            let pass = passes::Push {
-                level_nodes: &hierarchy.levels.nodes,
-                nodes: &hierarchy.nodes,
-                incident: &self.incident,
-                constants: passes::PushConstants { words: Self::words(self.half) as u32 },
-                params: passes::PushParams {
-                    first: level.start,
-                    count: level.len() as u32,
-                    node_count: hierarchy.node_count(),
-                },
-            };
-            recorder.dispatch(&pass, Threads::Grid(level.len() as u32, self.bin_count / BINS_A_THREAD, 1));
+            for window in &self.windows {
+                let pass = passes::Push {
+                    level_nodes: &hierarchy.levels.nodes,
+                    nodes: &hierarchy.nodes,
+                    incident: &window.incident,
+                    constants: passes::PushConstants { words: Self::words(self.half) as u32 },
+                    params: passes::PushParams {
+                        first: level.start,
+                        count: level.len() as u32,
+                        node_count: hierarchy.node_count(),
+                    },
+                };
+                recorder.dispatch(&pass, Threads::Grid(level.len() as u32, window.parts(), 1));
+            }
         });
     }
 
-    fn local(&self, recorder: &mut Recorder<'_>, hierarchy: &Hierarchy, bins: &DeviceBins, step: LocalStep) {
+    fn local<'a>(
+        &'a self,
+        recorder: &mut Recorder<'_>,
+        hierarchy: &'a Hierarchy,
+        bins: &'a DeviceBins,
+        step: LocalStep,
+    ) {
         if step.reflects {
             recorder.scope("local/glossy", |recorder| {
                 self.gloss.reflect(recorder, self, hierarchy, bins, false, step.bounced)
@@ -223,26 +274,27 @@ impl Tables {
         }
         let (leaf_count, node_count) = (hierarchy.leaf_count(), hierarchy.node_count());
         let (words, bin_count) = (Self::words(self.half) as u32, self.bin_count);
-        let part_count = part_count(bin_count);
+        let part_count = bin_count / BINS_A_THREAD;
         let undershoot = if step.cuts { 0.0 } else { step.bounced * self.undershoot };
         let (sets_floor, add_environment) = (u32::from(step.sets_floor), u32::from(step.has_environment));
         let is_undamped = u32::from(!step.sets_floor && step.damping == 1.0);
-        let irradiance = passes::LocalIrradiance {
+        let irradiance_of = |window: &'a TableWindow| passes::LocalIrradiance {
             leaves: &hierarchy.leaves,
             nodes: &hierarchy.nodes,
             cosine_norms: &self.cosine_norms,
             bin_directions: &bins.directions,
-            incident: &self.incident,
+            incident: &window.incident,
             environment: &self.environment,
             means: &self.means,
             peaks: &self.peaks,
             parts: &self.irradiance_parts,
-            exitant: &self.exitant,
+            exitant: &window.exitant,
             residual_parts: &self.residual_parts,
             constants: passes::LocalIrradianceConstants { words, bin_count },
             params: passes::LocalIrradianceParams {
                 leaf_count,
                 node_count,
+                first_bin: window.bins.start,
                 sets_floor,
                 undershoot,
                 damping: step.damping,
@@ -269,24 +321,25 @@ impl Tables {
                 is_undamped,
             },
         };
-        let exitant = passes::LocalExitant {
+        let exitant_of = |window: &'a TableWindow| passes::LocalExitant {
             leaves: &hierarchy.leaves,
             nodes: &hierarchy.nodes,
             cosine_norms: &self.cosine_norms,
             bin_directions: &bins.directions,
-            incident: &self.incident,
+            incident: &window.incident,
             environment: &self.environment,
             radiosity: &self.radiosity,
             means: &self.means,
             peaks: &self.peaks,
             glossy_of_leaf: &self.gloss.glossy_of_leaf,
             specular: &self.gloss.specular,
-            exitant: &self.exitant,
+            exitant: &window.exitant,
             residual_parts: &self.residual_parts,
             constants: passes::LocalExitantConstants { words, bin_count },
             params: passes::LocalExitantParams {
                 leaf_count,
                 node_count,
+                first_bin: window.bins.start,
                 sets_floor,
                 undershoot,
                 damping: step.damping,
@@ -304,29 +357,30 @@ impl Tables {
             params: passes::LocalResidualParams { leaf_count, part_count },
         };
         recorder.scope("local", |recorder| {
-            recorder.dispatch(&irradiance, Threads::Grid(leaf_count, part_count, 1));
+            for window in &self.windows {
+                recorder.dispatch(&irradiance_of(window), Threads::Grid(leaf_count, window.parts(), 1));
+            }
             recorder.dispatch(&reflect, leaf_count);
-            recorder.dispatch(&exitant, Threads::Grid(leaf_count, part_count, 1));
+            for window in &self.windows {
+                recorder.dispatch(&exitant_of(window), Threads::Grid(leaf_count, window.parts(), 1));
+            }
             recorder.dispatch(&residual, leaf_count);
         });
         recorder.scope("pull", |recorder| {
             hierarchy.levels.upwards(recorder, |recorder, level| {
-                let pass = passes::Pull {
-                    level_nodes: &hierarchy.levels.nodes,
-                    nodes: &hierarchy.nodes,
-                    exitant: &self.exitant,
-                    constants: passes::PullConstants { words },
-                    params: passes::PullParams { first: level.start, count: level.len() as u32, node_count },
-                };
-                recorder.dispatch(&pass, Threads::Grid(level.len() as u32, self.bin_count / BINS_A_THREAD, 1));
+                for window in &self.windows {
+                    let pass = passes::Pull {
+                        level_nodes: &hierarchy.levels.nodes,
+                        nodes: &hierarchy.nodes,
+                        exitant: &window.exitant,
+                        constants: passes::PullConstants { words },
+                        params: passes::PullParams { first: level.start, count: level.len() as u32, node_count },
+                    };
+                    recorder.dispatch(&pass, Threads::Grid(level.len() as u32, window.parts(), 1));
+                }
             });
         });
     }
-}
-
-/// Threads that share a leaf's bins in the local pass.
-fn part_count(bin_count: u32) -> u32 {
-    (bin_count / 2).div_ceil(PAIRS_A_THREAD)
 }
 
 /// Mean radiance of the environment's light that travels along each bin.

@@ -1,5 +1,6 @@
 //! Debug views: false colours per element that show what the method holds.
 
+use super::tables::TableWindow;
 use super::{Antiradiance, AntiradianceError, Settings, Tables};
 use crate::gpu::{Context, GpuError};
 use crate::stages::false_color::{self, NEUTRAL, PICKED};
@@ -91,10 +92,12 @@ impl Antiradiance {
         let norms = context.download(&self.tables.cosine_norms)?;
         let radiosity = context.download(&self.tables.radiosity)?;
         let words = Tables::words(self.tables.half) as usize;
-        let table = context.download(&self.tables.exitant)?;
+        let is_picked = |window: &&TableWindow| window.bins.contains(&bin);
+        let Some(window) = self.tables.windows.iter().find(is_picked) else { return Ok(Vec::new()) };
+        let table = context.download(&window.exitant)?;
         let plan_nodes = self.hierarchy.node_count() as usize;
         let sent = leaves.iter().zip(&norms).enumerate().map(|(index, (leaf, norm))| {
-            let at = (bin as usize * plan_nodes + leaf.node as usize) * words;
+            let at = ((bin - window.bins.start) as usize * plan_nodes + leaf.node as usize) * words;
             let exitant = entry(&table[at..at + words]);
             let cosine = leaf.normal.dot(w);
             let held = norm * cosine.abs().max(0.5 / (bins.count() as f32).sqrt());
