@@ -3,8 +3,9 @@
 #include "lib/packed_hierarchy.glsl"
 #include "lib/pair_queue.glsl"
 
-// One thread per node pair of a step: a node with itself becomes all pairs of its children; two nodes become a link when
-// neither is larger than a direction bin as seen from the other, or cannot be split; else the larger one is split.
+// One thread per node pair of a step, which is to be split: a node with itself into all pairs of its children, else the larger
+// one. Two nodes become a link when neither is larger than a direction bin as seen from the other, or cannot be split; only what
+// is to be split in turn goes back on the stack.
 //                                                                                            [Dachsbacher2007 3.2]
 // reads node_texels, taken_pairs   updates counters, pair_stack   writes links, links_1, links_2, links_3 (pairs of nodes, both
 // directions, one after the other: part_capacity each)   shared none
@@ -25,46 +26,60 @@ layout(push_constant, scalar) uniform Params {
 } params;
 
 const float PI = 3.14159265358979;
+const uint MAX_CHILDREN = 4;
 
-uint skip_of(uint node) { return NODE_TEXEL(node, 4).x; }
+// What becomes of a pair of nodes.
+const uint DROPPED = 0, LINKED = 1, SPLIT = 2;
 
-bool is_inner(uint node) { return NODE_TEXEL(node, 0).w == NONE; }
+struct End {
+    uint node;
+    vec3 center;
+    float radius, margin;
+    bool is_inner;
+    uint skip, shape, surface;
+};
 
-void split_self(uint node)
+End end_of(uint node)
 {
-    uint end = skip_of(node), children = 0, inner = 0;
-    for (uint child = node + 1; child < end; child = skip_of(child)) {
-        children += 1;
-        if (is_inner(child)) inner += 1;
-    }
-    uint slot = atomicAdd(counters[0].top, children * (children - 1) / 2 + inner);
-    for (uint a = node + 1; a < end; a = skip_of(a)) {
-        if (is_inner(a)) pair_stack[slot++] = uvec2(a);
-        for (uint b = skip_of(a); b < end; b = skip_of(b)) pair_stack[slot++] = uvec2(a, b);
-    }
-}
-
-// Replaces `node`, which ends at `end`, of a pair with `other` by its children.
-void split(uint node, uint end, uint other)
-{
-    uint children = 0;
-    for (uint child = node + 1; child < end; child = skip_of(child)) children += 1;
-    uint slot = atomicAdd(counters[0].top, children);
-    for (uint child = node + 1; child < end; child = skip_of(child)) pair_stack[slot++] = uvec2(child, other);
+    uvec4 place = NODE_TEXEL(node, 0), last = NODE_TEXEL(node, 4);
+    return End(node, uintBitsToFloat(place.xyz), uintBitsToFloat(NODE_TEXEL(node, 2).w), uintBitsToFloat(last.w), place.w == NONE,
+               last.x, last.y, last.z);
 }
 
 // Whether two flat nodes at rest each have the other behind a solid's surface: neither receives anything.
-bool are_back_to_back(uvec2 pair, vec3 offset, vec2 radius)
+bool are_back_to_back(End x, End y, vec3 offset)
 {
-    if (((NODE_TEXEL(pair.x, 3).w | NODE_TEXEL(pair.y, 3).w) & BLOCKS_BEHIND) != 0) return false;
-    vec3 x = uintBitsToFloat(NODE_TEXEL(pair.x, 1).xyz), y = uintBitsToFloat(NODE_TEXEL(pair.y, 1).xyz);
-    float cosine = dot(x, y), slant = sqrt(max(1.0 - cosine * cosine, 0.0));
+    uvec4 x_last = NODE_TEXEL(x.node, 3), y_last = NODE_TEXEL(y.node, 3);
+    if (((x_last.w | y_last.w) & BLOCKS_BEHIND) != 0) return false;
+    vec3 x_normal = uintBitsToFloat(NODE_TEXEL(x.node, 1).xyz), y_normal = uintBitsToFloat(NODE_TEXEL(y.node, 1).xyz);
+    float cosine = dot(x_normal, y_normal), slant = sqrt(max(1.0 - cosine * cosine, 0.0));
     // How far the sphere around a flat node reaches along the other's normal.
-    return dot(x, offset) <= -radius.y * slant && dot(y, offset) >= radius.x * slant;
+    return dot(x_normal, offset) <= -y.radius * slant && dot(y_normal, offset) >= x.radius * slant;
+}
+
+// Whether a node must be split, `allowed` being the largest cross-section that need not: of the sphere around everything below.
+bool is_large(End end, float allowed) { return end.is_inner && PI * end.radius * end.radius > allowed; }
+
+// The largest cross-section at the least distance that the two may come to.
+float allowed_between(End x, End y, vec3 offset)
+{
+    float apart = length(offset) - (x.margin + y.margin);
+    return apart > 0.0 ? params.solid_angle * apart * apart : 0.0;
+}
+
+uint fate_of(End x, End y)
+{
+    if (x.surface != NONE && x.surface == y.surface) return DROPPED;
+    vec3 offset = y.center - x.center;
+    float allowed = allowed_between(x, y, offset);
+    if (is_large(x, allowed) || is_large(y, allowed)) return SPLIT;
+    bool may_be_apart = x.margin + y.margin == 0.0 && x.shape != NONE && y.shape != NONE;
+    return may_be_apart && are_back_to_back(x, y, offset) ? DROPPED : LINKED;
 }
 
 void add_link(uint slot, uvec2 pair)
 {
+    if (slot >= params.capacity) return;
     uint part = slot / params.part_capacity, at = slot % params.part_capacity;
     if (part == 0) links[at] = pair;
     else if (part == 1) links_1[at] = pair;
@@ -72,35 +87,47 @@ void add_link(uint slot, uvec2 pair)
     else links_3[at] = pair;
 }
 
+// The pairs of `other` with the nodes from `first` on, each where the one before ends: links, and what is to be split.
+void pair_up(End other, uint first, uint end)
+{
+    uint nodes[MAX_CHILDREN], fates[MAX_CHILDREN], count = 0, link_count = 0, split_count = 0;
+    for (uint node = first; node < end && count < MAX_CHILDREN; ++count) {
+        End child = end_of(node);
+        uint fate = fate_of(child, other);
+        nodes[count] = node;
+        fates[count] = fate;
+        link_count += fate == LINKED ? 1 : 0;
+        split_count += fate == SPLIT ? 1 : 0;
+        node = child.skip;
+    }
+    uint link_slot = link_count > 0 ? atomicAdd(counters[0].accepted, link_count) : 0;
+    uint split_slot = split_count > 0 ? atomicAdd(counters[0].top, split_count) : 0;
+    for (uint k = 0; k < count; ++k) {
+        uvec2 pair = uvec2(nodes[k], other.node);
+        if (fates[k] == LINKED) add_link(link_slot++, pair);
+        if (fates[k] == SPLIT) pair_stack[split_slot++] = pair;
+    }
+}
+
 void main()
 {
     uint i = linear_index();
     if (i >= counters[0].taken) return;
-
     uvec2 pair = taken_pairs[i];
-    // skip, shape, surface, margin
-    uvec4 x = NODE_TEXEL(pair.x, 4), y = NODE_TEXEL(pair.y, 4);
-    if (x.z != NONE && x.z == y.z) return;
+    End x = end_of(pair.x);
     if (pair.x == pair.y) {
-        if (is_inner(pair.x)) split_self(pair.x);
+        // The children with one another, and each with itself.
+        for (uint a = pair.x + 1; x.is_inner && a < x.skip;) {
+            End child = end_of(a);
+            if (child.is_inner) pair_stack[atomicAdd(counters[0].top, 1)] = uvec2(a);
+            pair_up(child, child.skip, x.skip);
+            a = child.skip;
+        }
         return;
     }
-
-    // Of the sphere around everything below, at the least distance that the two may come to.
-    uvec4 x_place = NODE_TEXEL(pair.x, 0), y_place = NODE_TEXEL(pair.y, 0);     // centre, leaf
-    vec3 offset = uintBitsToFloat(y_place.xyz) - uintBitsToFloat(x_place.xyz);
-    vec2 radius = uintBitsToFloat(uvec2(NODE_TEXEL(pair.x, 2).w, NODE_TEXEL(pair.y, 2).w));
-    float margin = uintBitsToFloat(x.w) + uintBitsToFloat(y.w), apart = length(offset) - margin;
-    float allowed = apart > 0.0 ? params.solid_angle * apart * apart : 0.0;
-    bvec2 must_split = bvec2(x_place.w == NONE && PI * radius.x * radius.x > allowed,
-                             y_place.w == NONE && PI * radius.y * radius.y > allowed);
-    if (!must_split.x && !must_split.y) {
-        if (margin == 0.0 && x.y != NONE && y.y != NONE && are_back_to_back(pair, offset, radius)) return;
-        uint slot = atomicAdd(counters[0].accepted, 1);
-        if (slot < params.capacity) add_link(slot, pair);
-    } else if (must_split.x && (!must_split.y || radius.x >= radius.y)) {
-        split(pair.x, x.x, pair.y);
-    } else {
-        split(pair.y, y.x, pair.x);
-    }
+    End y = end_of(pair.y);
+    float allowed = allowed_between(x, y, y.center - x.center);
+    bool is_x_larger = is_large(x, allowed) && (!is_large(y, allowed) || x.radius >= y.radius);
+    if (x.is_inner && (is_x_larger || !y.is_inner)) pair_up(y, pair.x + 1, x.skip);
+    else pair_up(x, pair.y + 1, y.skip);
 }

@@ -17,7 +17,7 @@ pub struct Report {
     /// Levels below the root.
     pub depth: u32,
     pub bins: u32,
-    /// Node pairs looked at.
+    /// Node pairs that were split.
     pub pairs: u32,
     /// Links, each of both directions counted.
     pub links: u64,
