@@ -330,6 +330,23 @@ fn heat_maps_are_written_whole_or_not_at_all() {
     assert_eq!(folder.names(), ["a.exr", "b.exr", "bad.exr", "map.png"], "no temporary file stays");
 }
 
+/// A picture that must be black is told with its reason, and what helps.
+#[test]
+fn a_scene_without_light_is_told() {
+    let folder = Pictures::new();
+    let output = folder.text("a.png");
+    let line = ["render", "builtin:furnace", "-o", &output, "--size", "8x8", "--spp", "1", "--method", "path-tracing"];
+    let dark = ["--edit", "material:0.emission=0,0,0"];
+    let tells = |more: &[&str]| {
+        let run = linklight(&[&line[..], more].concat());
+        run.succeeds();
+        run.err.contains("no light") && run.err.contains("--env")
+    };
+    assert!(tells(&dark));
+    assert!(!tells(&[]));
+    assert!(!tells(&[&dark[..], &["--env", "1,1,1"]].concat()));
+}
+
 #[test]
 fn log_settings_that_are_not_understood_are_said_and_ignored() {
     let run = run(program().arg("methods").env("RUST_LOG", "linklight=loudly"));

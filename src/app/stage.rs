@@ -15,7 +15,7 @@ use crate::scene::environment::load::{self as environment, EnvironmentLimits, En
 use crate::scene::geometry::Geometry;
 use crate::scene::pose::Pose;
 use crate::scene::tessellate::{Fineness, Tessellation, tessellate};
-use crate::scene::{LoadOptions, Scene, animation, builtin, deform};
+use crate::scene::{LoadOptions, Material, Scene, animation, builtin, deform};
 use crate::stages::bvh::Bvh;
 use crate::stages::trace::Tracer;
 use crate::stages::world::World;
@@ -149,6 +149,12 @@ impl Stage {
         );
         let acceleration = build_acceleration(context, request.rays, &world)?;
         let environment = environment.environment;
+        if is_dark(&scene, &geometry, &pose, &environment) {
+            tracing::warn!(
+                "the scene has no light: no lamp, nothing that emits, no environment, so the picture is black; \
+                 --env 1,1,1 lights it evenly, --env FILE.hdr by a picture of the surroundings"
+            );
+        }
         Ok(Self { scene, geometry, rest_positions, environment, pose, bounds, view, world, bvh, acceleration })
     }
 
@@ -175,6 +181,14 @@ impl Stage {
             lights: self.pose.lights.len() as u64,
         }
     }
+}
+
+/// Whether nothing shines: no light, no surface, no sky.
+fn is_dark(scene: &Scene, geometry: &Geometry, pose: &Pose, environment: &Environment) -> bool {
+    let shines = |material: &Material| material.unlit || material.emission != Vec3::ZERO;
+    environment.is_black()
+        && pose.lights.iter().all(|light| light.intensity == Vec3::ZERO)
+        && !geometry.parts.iter().any(|part| shines(&scene.materials[part.material as usize]))
 }
 
 /// The free camera of the request, else the camera it names, else the scene's first, else one framed on the bounds.
