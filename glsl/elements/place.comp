@@ -4,10 +4,11 @@
 
 // One thread per element: where it is, which way it looks, and where its rays start.              [Schmitz2008 3.2]
 // reads element_vertices[element_count], positions, normals [vertex_count], triangles, incident_offsets[vertex_count + 1],
-// incident_triangles   writes element_positions (m), element_normals (unit), ray_origins (m) [element_count]   shared none
+// incident_triangles, open_places[element_count]   writes element_positions (m), element_normals (unit),
+// ray_origins (m) [element_count]   shared none
 // Differs from [Schmitz2008]: rays start a little off the vertex. Along the normal, so that they leave their own surface;
 // and towards the middle of the triangles around, so that a vertex on the edge between floor and wall looks from the
-// floor and sees the wall, not the plane of it from within.
+// floor and sees the wall, not the plane of it from within. Those inside of other things look from a place in the open.
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer ElementVertices { uint element_vertices[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Positions { vec3 positions[]; };
@@ -18,6 +19,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer IncidentTriangles { uint in
 layout(set = 0, binding = 6, scalar) writeonly buffer ElementPositions { vec3 element_positions[]; };
 layout(set = 0, binding = 7, scalar) writeonly buffer ElementNormals { vec3 element_normals[]; };
 layout(set = 0, binding = 8, scalar) writeonly buffer RayOrigins { vec3 ray_origins[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer OpenPlaces { OpenPlace open_places[]; };
 layout(push_constant, scalar) uniform Params { uint element_count; float ray_offset; } params;    // ray_offset: m
 
 // Share of the way from the vertex to the mean centroid of the triangles around it.
@@ -42,7 +44,15 @@ void main()
     if (last > first) inward /= 3.0 * float(last - first);
     inward -= normal * dot(normal, inward);
 
+    vec3 origin = position + INWARD * inward;
+    OpenPlace open = open_places[element];
+    if (open.triangle != NO_ELEMENT) {
+        uvec3 v = triangles[open.triangle];
+        vec3 corner = positions[v.x];
+        position = corner + open.barycentrics.x * (positions[v.y] - corner) + open.barycentrics.y * (positions[v.z] - corner);
+        origin = position;
+    }
     element_positions[element] = position;
     element_normals[element] = normal;
-    ray_origins[element] = position + INWARD * inward + params.ray_offset * normal;
+    ray_origins[element] = origin + params.ray_offset * normal;
 }

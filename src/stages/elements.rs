@@ -4,8 +4,10 @@
 //! is lit on each side by what that side sees. Element `e < vertex_count` is the front of vertex `e`.
 //! What does not change with the pose is made once; [`Elements::place`] follows a deformation.
 
+use super::open_places::AT_ITS_VERTEX;
 use super::world::World;
 use crate::gpu::shaders::elements as passes;
+use crate::gpu::shaders::types::OpenPlace;
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::scene::Scene;
 use crate::scene::adjacency::{self, Rows};
@@ -86,7 +88,7 @@ pub struct Elements {
     /// Vertices come first: `vertices[e] == e` for `e < vertex_count`.
     pub vertices: Buffer<u32>,
     pub back_elements: Buffer<u32>,
-    /// Metres, world.
+    /// Where it receives, metres, world.
     pub positions: Buffer<Vec3>,
     /// Unit, towards the element's side.
     pub normals: Buffer<Vec3>,
@@ -103,6 +105,7 @@ pub struct Elements {
     pub ring_offsets: Buffer<u32>,
     pub ring: Buffer<u32>,
     pub shadow_offsets: Buffer<u32>,
+    open_places: Buffer<OpenPlace>,
     pub topology: ElementTopology,
     /// How far rays start off their surface, metres.
     pub ray_offset: f32,
@@ -134,6 +137,7 @@ impl Elements {
             ring_offsets: context.upload("elements/ring offsets", &topology.ring.offsets)?,
             ring: context.upload("elements/ring", &topology.ring.values)?,
             shadow_offsets: context.upload("elements/shadow offsets", &topology.shadow_offsets)?,
+            open_places: context.upload("elements/open places", &vec![AT_ITS_VERTEX; count])?,
             ray_offset: relative_ray_offset * extent(positions),
             topology,
         };
@@ -146,11 +150,26 @@ impl Elements {
 
     /// Bytes of the tables of [`Self::new`], as counted before any of them is made.
     pub fn bytes_needed(topology: &ElementTopology) -> u64 {
-        let words = topology.vertices.len() * (1 + 3 + 3 + 3 + 3 + 3 + 1 + 1 + 1)
+        let words = topology.vertices.len() * (1 + 3 + 3 + 3 + 3 + 3 + 1 + 1 + 1 + 3)
             + topology.back_elements.len() * 2
             + topology.incident.values.len()
             + topology.ring.values.len();
         4 * words as u64
+    }
+
+    /// From the next [`Self::place`] on, elements look from `places`, one each. Shadow rays of one that does not look from
+    /// its vertex start there alone.
+    pub fn look_from(&mut self, context: &Context, places: &[OpenPlace]) -> Result<(), GpuError> {
+        let offsets = &mut self.topology.shadow_offsets;
+        let mut rays = 0;
+        for (element, place) in places.iter().enumerate() {
+            let own = offsets[element + 1] - offsets[element];
+            let is_moved = *place != AT_ITS_VERTEX;
+            (offsets[element], rays) = (rays, rays + if is_moved { 1 } else { own });
+        }
+        offsets[places.len()] = rays;
+        context.write(&self.shadow_offsets, &self.topology.shadow_offsets)?;
+        context.write(&self.open_places, places)
     }
 
     /// Follows the world's vertices.
@@ -165,6 +184,7 @@ impl Elements {
             element_positions: &self.positions,
             element_normals: &self.normals,
             ray_origins: &self.ray_origins,
+            open_places: &self.open_places,
             params: passes::PlaceParams { element_count: self.count, ray_offset: self.ray_offset },
         };
         recorder.dispatch(&pass, self.count);

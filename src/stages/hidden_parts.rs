@@ -18,7 +18,7 @@ use glam::Vec3;
 /// Rays that look around from each part.
 const SAMPLES: u32 = 8;
 /// Of those, as many that end at backs make a part hidden.
-const HIDDEN_FROM: u32 = SAMPLES / 2 + 1;
+pub const HIDDEN_FROM: u32 = SAMPLES / 2 + 1;
 /// Parts of a batch.
 const BATCH_PARTS: u32 = 1 << 16;
 
@@ -70,7 +70,7 @@ pub fn leave_out(
 }
 
 /// Of each point (metres, with its unit normal), how many of its rays end at the back of a one-sided surface.
-fn back_hits(
+pub fn back_hits(
     context: &Context,
     tracer: &Tracer<'_>,
     (points, normals): (&[Vec3], &[Vec3]),
@@ -78,16 +78,18 @@ fn back_hits(
     watch: &dyn Watch,
 ) -> Result<Vec<u32>, HiddenPartsError> {
     let part_count = points.len() as u32;
-    let ray_count = (part_count.min(BATCH_PARTS) * SAMPLES) as usize;
+    let fitting = context.limits().storage_buffer_bytes / u64::from(SAMPLES * size_of::<Ray>() as u32);
+    let batch = (fitting.max(1) as u32).min(BATCH_PARTS);
+    let ray_count = (part_count.min(batch) * SAMPLES) as usize;
     let points = context.upload("hidden parts/points", points)?;
     let normals = context.upload("hidden parts/normals", normals)?;
     let back_hits = context.buffer("hidden parts/back hits", part_count as usize)?;
     let rays: Buffer<Ray> = context.buffer("hidden parts/rays", ray_count)?;
     let hits: Buffer<Hit> = context.buffer("hidden parts/hits", ray_count)?;
     let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = tracer;
-    for first_part in (0..part_count).step_by(BATCH_PARTS as usize) {
+    for first_part in (0..part_count).step_by(batch as usize) {
         watch.step("hidden parts", first_part.into(), part_count.into())?;
-        let batch_count = BATCH_PARTS.min(part_count - first_part);
+        let batch_count = batch.min(part_count - first_part);
         let mut recorder = context.recorder("hidden parts")?;
         let params = passes::PartRaysParams { first_part, batch_count, sample_count: SAMPLES, ray_offset };
         let pass = passes::PartRays { points: &points, normals: &normals, rays: &rays, params };

@@ -17,6 +17,7 @@ pub mod kept;
 pub mod levels;
 pub mod link_rows;
 pub mod links;
+pub mod open_places;
 pub mod pair_queue;
 pub mod punctual;
 pub mod quadtree;

@@ -54,6 +54,24 @@ pub fn one_sided_box(low: Vec3, high: Vec3, cells: u32) -> Vec<Primitive> {
     ]
 }
 
+/// A strip of wall, 2 m by 12 cm and facing +z, between a rail and a sill that hide its four corners (its first four
+/// vertices): from height .025 to .09 above its lower edge it lies in the open, of 2.5 cm and 7 cm of depth beside it.
+pub fn strip_between_boards() -> Scene {
+    let mut parts = vec![parallelogram(Vec3::Y, Vec3::X * 2.0, Vec3::Y * 0.12, 1, 0)];
+    for (bottom, top, depth) in [(0.95, 1.025, 0.025), (1.09, 1.13, 0.07)] {
+        let (low, high) = (Vec3::new(-0.1, bottom, -0.05), Vec3::new(2.1, top, depth));
+        parts.extend(one_sided_box(low, high, 1));
+        parts.push(parallelogram(low, Vec3::X * (high.x - low.x), Vec3::Z * (high.z - low.z), 1, 0));
+    }
+    scene(vec![Material { double_sided: false, ..lambert(Vec3::splat(0.5)) }], parts, &[])
+}
+
+/// What the corners of that strip receive of an even sky of radiance 1, by what the boards leave of it at a height, W/m2.
+pub fn sky_on_the_strip(height: f32) -> f32 {
+    let leaves = |reach: f32, depth: f32| reach / reach.hypot(depth);
+    0.5 * std::f32::consts::PI * (leaves(0.09 - height, 0.07) + leaves(height - 0.025, 0.025))
+}
+
 /// One node per primitive, one per light (at `position`, shining along `direction`).
 pub fn scene(materials: Vec<Material>, primitives: Vec<Primitive>, lights: &[(Light, Vec3, Vec3)]) -> Scene {
     let mut scene = Scene { name: "test".into(), materials, ..Scene::default() };

@@ -3,10 +3,11 @@
 use crate::common::{Random, TestContext};
 use crate::meshes::{COUNTS, Mesh, assert_close, points, rows, unit};
 use crate::twins;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use linklight::gpu::shaders::elements as passes;
 use linklight::gpu::shaders::methods::explicit_visibility as method_passes;
-use linklight::gpu::shaders::types::Ray;
+use linklight::gpu::shaders::types::{OpenPlace, Ray};
+use linklight::stages::open_places::AT_ITS_VERTEX;
 use std::f32::consts::PI;
 
 #[test]
@@ -15,6 +16,16 @@ fn place_agrees_with_its_twin() {
     let mut random = Random(11);
     for count in COUNTS {
         let mesh = Mesh::random(&mut random, count);
+        // Every third element looks from elsewhere.
+        let triangle_count = mesh.triangles.len() as u32;
+        let places = (0..count).map(|element| match element % 3 {
+            0 if triangle_count > 0 => {
+                let barycentrics = Vec2::new(random.unit(), random.unit()) * 0.5;
+                OpenPlace { triangle: random.below(triangle_count), barycentrics }
+            }
+            _ => AT_ITS_VERTEX,
+        });
+        let places: Vec<OpenPlace> = places.collect();
         let out = [(); 3].map(|()| context.buffer::<Vec3>("test/out", count as usize).unwrap());
         let mut recorder = context.recorder("test").unwrap();
         let pass = passes::Place {
@@ -27,6 +38,7 @@ fn place_agrees_with_its_twin() {
             element_positions: &out[0],
             element_normals: &out[1],
             ray_origins: &out[2],
+            open_places: &context.upload("test/open places", &places).unwrap(),
             params: passes::PlaceParams { element_count: count, ray_offset: 0.01 },
         };
         recorder.dispatch(&pass, count);
@@ -37,6 +49,7 @@ fn place_agrees_with_its_twin() {
             &mesh.normals,
             &mesh.triangles,
             &mesh.incident,
+            &places,
             0.01,
         );
         for (buffer, twin) in out.iter().zip(&twin) {

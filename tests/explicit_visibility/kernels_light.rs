@@ -6,6 +6,7 @@ use crate::twins::{self, light::ShadowMesh};
 use glam::{Vec2, Vec3};
 use linklight::gpu::shaders::elements as passes;
 use linklight::gpu::shaders::types::{EmitterSample, Light, Ray};
+use linklight::stages::open_places::AT_ITS_VERTEX;
 
 /// One of each kind.
 fn lights(random: &mut Random) -> Vec<Light> {
@@ -44,6 +45,7 @@ fn punctual_passes_agree_with_their_twins() {
             &mesh.normals,
             &mesh.triangles,
             &mesh.incident,
+            &vec![AT_ITS_VERTEX; mesh.element_vertices.len()],
             0.01,
         );
         let element_vertices = context.upload("test/vertices", &mesh.element_vertices).unwrap();
@@ -127,6 +129,7 @@ fn emitter_passes_agree_with_their_twins() {
             &mesh.normals,
             &mesh.triangles,
             &mesh.incident,
+            &vec![AT_ITS_VERTEX; mesh.element_vertices.len()],
             0.01,
         );
         let emission: Vec<Vec3> = points(&mut random, mesh.positions.len() as u32).iter().map(|p| p.abs()).collect();

@@ -1,7 +1,7 @@
 //! Closed forms and conservation laws.
 
 use crate::common::TestContext;
-use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::common::scenes::{lambert, light, parallelogram, scene, sky_on_the_strip, strip_between_boards};
 use crate::fixture::{Fixture, builtin_scene, solve};
 use glam::Vec3;
 use linklight::methods::implicit_visibility::{Footprint, Frames, Settings, Transport};
@@ -105,4 +105,21 @@ fn little_leaks_through_a_closed_door() {
     let single = leak(Settings { bins: 8, footprint: Footprint::Single, fill_holes: false, ..Settings::default() });
     println!("two-rooms, N = 8: leaked share {covered:.2e} with footprints, {single:.2e} without");
     assert!(covered < 5e-3 && 5.0 * covered < single, "{covered} {single}");
+}
+
+/// A strip of wall whose corners all lie inside of boards is as bright as what of it lies in the open.
+#[test]
+fn corners_inside_of_boards_receive_what_arrives_in_the_open() {
+    let context = TestContext::new();
+    let sky = Environment::Constant(Vec3::ONE);
+    let fixture = Fixture::posed(&context, strip_between_boards(), None, sky, Pose::rest);
+    let method = fixture.linked(&context, Settings::default());
+    let direct = solve(&context, &method, &fixture.world, 0).direct;
+    // Of all heights in the open, the least and the most that arrives.
+    let open: Vec<f32> = (30..=85).map(|height| sky_on_the_strip(height as f32 / 1000.0)).collect();
+    let [least, most] = [open.iter().copied().fold(f32::MAX, f32::min), open.iter().copied().fold(0.0, f32::max)];
+    for (corner, found) in direct.iter().take(4).enumerate() {
+        println!("corner {corner}: {found} of {least} to {most}");
+        assert!(found.x > 0.9 * least && found.x < 1.1 * most, "corner {corner}: {found}, {least} to {most} allowed");
+    }
 }

@@ -56,7 +56,8 @@ impl Helper {
         let bvh = Bvh::build(&context, &positions, &stage.geometry.triangles)?;
         let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
         let sizes = Sizes::new(&context, &topology, world.light_count, &settings, u64::MAX)?;
-        let elements = Elements::new(&context, topology, stage.rest_positions, &world, settings.ray_offset)?;
+        let own = Stage { world: &world, tracer: Tracer::compute(&bvh, &world), watch: &Unwatched, ..*stage };
+        let elements = own.elements(&context, topology, settings.ray_offset)?;
         let outcomes = Outcomes::new(&context, elements.count, settings.rays_per_element.get())?;
         let linked = Linked { settings: &settings, elements: &elements, outcomes: &outcomes, sizes: &sizes };
         let linking = Linking::new(&context, linked)?;
@@ -79,15 +80,8 @@ impl Helper {
     }
 
     fn make(&mut self, stage: &Stage<'_>, range: Range<u32>) -> Result<Piece, ExplicitError> {
-        let own = Stage {
-            world: &self.world,
-            tracer: Tracer::compute(&self.bvh, &self.world),
-            watch: &Unwatched,
-            scene: stage.scene,
-            geometry: stage.geometry,
-            rest_positions: stage.rest_positions,
-            environment: stage.environment,
-        };
+        let own =
+            Stage { world: &self.world, tracer: Tracer::compute(&self.bvh, &self.world), watch: &Unwatched, ..*stage };
         let Self { settings, elements, outcomes, sizes, linking, context, .. } = self;
         make(context, &own, Linked { settings, elements, outcomes, sizes }, linking, range)
     }

@@ -7,6 +7,7 @@ use crate::gpu::{Buffer, Context, GpuError};
 use crate::scene::environment::Environment;
 use crate::stages::bvh::BvhError;
 use crate::stages::elements::{ElementTopology, Elements};
+use crate::stages::hidden_parts::HiddenPartsError;
 use crate::stages::links::{LinkBuilder, LinkCounts, LinkError, LinkFormat, Links, Outcomes};
 use crate::stages::trace;
 use crate::stages::work::Interrupted;
@@ -27,6 +28,8 @@ pub enum ExplicitError {
     Bvh(#[from] BvhError),
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    HiddenParts(#[from] HiddenPartsError),
     #[error(
         "explicit visibility needs {needed} bytes beside its links for {elements} elements, {available} are available; \
          lower --elements or rays_per_element"

@@ -25,8 +25,8 @@
 //! [`ExplicitVisibility::follow_within`]).
 //!
 //! Differs from [Schmitz2008]: radiosity and irradiance instead of radiance; a double-sided surface has elements on
-//! both sides; area lights and an environment; elements inside other things take their neighbours' light. What it does
-//! not do: glossy transport between elements.
+//! both sides; area lights and an environment; elements inside other things look from the open beside them, or take
+//! their neighbours' light. What it does not do: glossy transport between elements.
 //!
 //! [Schmitz2008]: crate::methods::PAPERS
 
@@ -36,12 +36,14 @@ mod devices;
 mod linking;
 mod ray_count;
 mod report;
+mod stage;
 mod views;
 
 pub use devices::Helper;
 pub use linking::ExplicitError;
 pub use ray_count::RayCount;
 pub use report::Report;
+pub use stage::Stage;
 pub use views::Shown;
 
 use crate::gpu::shaders::elements::{EmittedRadiosity, EmittedRadiosityParams, FillUnresolved, FillUnresolvedParams};
@@ -49,14 +51,10 @@ use crate::gpu::shaders::methods::explicit_visibility as passes;
 use crate::gpu::shaders::types::Ray;
 use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
 use crate::methods::pick::Pick;
-use crate::scene::Scene;
 use crate::scene::environment::Environment;
-use crate::scene::geometry::Geometry;
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::emitters::{EmitterChoice, Emitters};
 use crate::stages::links::{Links, Outcomes};
-use crate::stages::trace::Tracer;
-use crate::stages::work::Watch;
 use crate::stages::world::{World, WorldEnvironment};
 use crate::stages::{gather, punctual};
 use glam::Vec3;
@@ -127,20 +125,6 @@ struct State {
     is_free: Buffer<u32>,
 }
 
-/// What the method reads of the scene: plain data, and its form on the device in the present pose.
-#[derive(Clone, Copy)]
-pub struct Stage<'a> {
-    pub scene: &'a Scene,
-    pub geometry: &'a Geometry,
-    /// World space, one per vertex; equal where vertices stand at one place.
-    pub rest_positions: &'a [Vec3],
-    pub environment: &'a Environment,
-    pub world: &'a World,
-    pub tracer: Tracer<'a>,
-    /// Hears how far link generation is.
-    pub watch: &'a dyn Watch,
-}
-
 impl ExplicitVisibility {
     /// Makes elements and links and casts all shadow rays: everything but the light itself.
     pub fn prepare(context: &Context, stage: &Stage<'_>, settings: Settings) -> Result<Self, ExplicitError> {
@@ -177,7 +161,7 @@ impl ExplicitVisibility {
         let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
         let sizes = Sizes::new(context, &topology, stage.world.light_count, &settings, budget)?;
 
-        let elements = Elements::new(context, topology, stage.rest_positions, stage.world, settings.ray_offset)?;
+        let elements = stage.elements(context, topology, settings.ray_offset)?;
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
         let outcomes = Outcomes::new(context, elements.count, settings.rays_per_element.get())?;

@@ -6,6 +6,7 @@ use crate::gpu::shaders::methods::implicit_visibility as passes;
 use crate::gpu::shaders::types::{GroupWalk, LinkCounts, Receiver, ReceiverGroup, WindowLevel};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::stages::elements::Elements;
+use crate::stages::hidden_parts::HiddenPartsError;
 use crate::stages::quadtree::Quadtrees;
 use crate::stages::quadtree::topology::QuadtreeTopology;
 use crate::stages::work::{Interrupted, Watch};
@@ -34,6 +35,8 @@ pub enum ImplicitError {
     Gpu(#[from] GpuError),
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    HiddenParts(#[from] HiddenPartsError),
     #[error(
         "implicit visibility needs {needed} bytes for {elements} elements with {bins} bins each, {available} are \
          available; lower --elements or bins"

@@ -134,7 +134,7 @@ impl ImplicitVisibility {
             return Err(ImplicitError::OutOfMemory { needed, available, elements, bins: settings.bin_count() });
         }
 
-        let elements = Elements::new(context, topology, rest_positions, world, settings.ray_offset)?;
+        let elements = stage.elements(context, topology, settings.ray_offset)?;
         let trees = Quadtrees::new(context, tree_topology, elements.topology.incident.values.len())?;
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, geometry, rest_positions, &elements, choice, samples)?;

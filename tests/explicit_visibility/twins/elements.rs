@@ -1,9 +1,10 @@
 //! Twins of glsl/elements/ but for light sources, and of the rays of an element.
 
 use glam::{Mat3, Vec2, Vec3};
-use linklight::gpu::shaders::types::Ray;
+use linklight::gpu::shaders::types::{OpenPlace, Ray};
 use linklight::scene::adjacency::Rows;
 use linklight::stages::elements::BACK_SIDE;
+use linklight::stages::open_places::AT_ITS_VERTEX;
 use std::f32::consts::PI;
 
 fn side_of(entry: u32) -> f32 {
@@ -17,10 +18,11 @@ pub fn place(
     normals: &[Vec3],
     triangles: &[[u32; 3]],
     incident: &Rows,
+    open_places: &[OpenPlace],
     ray_offset: f32,
 ) -> [Vec<Vec3>; 3] {
     let mut placed = [vec![], vec![], vec![]];
-    for &entry in element_vertices {
+    for (&entry, open) in element_vertices.iter().zip(open_places) {
         let vertex = entry & !BACK_SIDE;
         let (position, normal) = (positions[vertex as usize], normals[vertex as usize] * side_of(entry));
         let mut inward = Vec3::ZERO;
@@ -32,9 +34,14 @@ pub fn place(
             inward /= 3.0 * count as f32;
         }
         inward -= normal * normal.dot(inward);
-        placed[0].push(position);
+        let mut origin = position + inward / 64.0;
+        if *open != AT_ITS_VERTEX {
+            let [a, b, c] = triangles[open.triangle as usize].map(|v| positions[v as usize]);
+            origin = a + open.barycentrics.x * (b - a) + open.barycentrics.y * (c - a);
+        }
+        placed[0].push(if *open == AT_ITS_VERTEX { position } else { origin });
         placed[1].push(normal);
-        placed[2].push(position + inward / 64.0 + ray_offset * normal);
+        placed[2].push(origin + ray_offset * normal);
     }
     placed
 }
