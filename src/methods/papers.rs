@@ -170,6 +170,14 @@ pub const PAPERS: &[Paper] = &[
         venue: "Monte Carlo and Quasi-Monte Carlo Methods 2006, Springer",
         doi: None,
     },
+    Paper {
+        key: "Debevec2005",
+        title: "A Median Cut Algorithm for Light Probe Sampling",
+        authors: "Paul Debevec",
+        year: 2005,
+        venue: "SIGGRAPH Posters",
+        doi: None,
+    },
     DONG_2007,
     Paper {
         key: "Duff2017",

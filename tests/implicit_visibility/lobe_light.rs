@@ -8,14 +8,18 @@ use crate::fixture::Fixture;
 use crate::gloss_twins::{N, SIDE, TOLERANCE, color, directions_of, towards, unit_vector, widened};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use linklight::gpu::shaders::methods::implicit_visibility as passes;
-use linklight::gpu::shaders::types::{EmitterSample, GlossTarget, LeafGloss, Light};
+use linklight::gpu::shaders::types::{EmitterSample, GlossTarget, LeafGloss, Light, SkySpot};
 use linklight::methods::implicit_visibility::Settings;
 use linklight::scene::pose::{Pose, PosedLight};
 use linklight::scene::{LightKind, Material};
 use linklight::stages::world::{self, World};
 use std::f64::consts::PI;
 
-/// Points on emitters and punctual lights in the lobes of elements.
+/// Bright spots of the environment.
+const SPOTS: usize = 35;
+
+/// Points on emitters, punctual lights and bright spots of an environment in the lobes of elements.
+#[derive(Clone)]
 struct Lights {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
@@ -26,6 +30,8 @@ struct Lights {
     visible: Vec<u32>,
     lights: Vec<PosedLight>,
     visibility: Vec<f32>,
+    spots: Vec<SkySpot>,
+    spots_seen: Vec<u32>,
 }
 
 impl Lights {
@@ -58,6 +64,8 @@ impl Lights {
             visible: (0..count * words).map(|_| random.next_u64() as u32).collect(),
             visibility: (0..count * lights.len()).map(|_| random.unit()).collect(),
             lights: lights.to_vec(),
+            spots: (0..SPOTS).map(|_| SkySpot { direction: unit_vector(random), irradiance: color(random) }).collect(),
+            spots_seen: (0..count * SPOTS.div_ceil(32)).map(|_| random.next_u64() as u32).collect(),
             corners,
         }
     }
@@ -88,6 +96,8 @@ impl Lights {
             visible: &context.upload("test/visible", &self.visible).unwrap(),
             lights: &context.upload("test/lights", &table).unwrap(),
             visibility: &context.upload("test/visibility", &self.visibility).unwrap(),
+            spots: &context.upload("test/spots", &self.spots).unwrap(),
+            spots_seen: &context.upload("test/spots seen", &self.spots_seen).unwrap(),
             reflected: &reflected,
             params: passes::ReflectLightsParams {
                 target,
@@ -95,6 +105,7 @@ impl Lights {
                 element_count: count,
                 sample_count: self.samples.len() as u32,
                 light_count,
+                spot_count: self.spots.len() as u32,
                 bin_count: 6 * N * N,
             },
         };
@@ -144,6 +155,12 @@ impl Lights {
                     let seen = f64::from(self.visibility[index * self.positions.len() + element]);
                     sum += value(to_eye, to_light) * arriving * (normal.dot(to_light).max(0.0) * seen);
                 }
+                for (index, spot) in self.spots.iter().enumerate() {
+                    let is_seen = self.spots_seen[element * SPOTS.div_ceil(32) + index / 32] >> (index % 32) & 1 != 0;
+                    let towards = spot.direction.as_dvec3();
+                    let cosine = if is_seen { normal.dot(towards).max(0.0) } else { 0.0 };
+                    sum += value(to_eye, towards) * spot.irradiance.as_dvec3() * cosine;
+                }
                 if to_eye.dot(normal) > 0.0 {
                     out[element * each + k] += sum.as_vec3();
                 }
@@ -182,6 +199,8 @@ fn points_on_emitters_and_lights_shine_in_lobes() {
                     visible: case.visible.iter().map(|bits| !bits).collect(),
                     ..Lights::new(count, sample_count, &mut Random(1))
                 };
+                let dark = Lights { spots_seen: vec![0; case.spots_seen.len()], ..case.clone() };
+                tells_apart("no spots", &dark.reflected(side, eye, &before, light_count), &expected, TOLERANCE);
                 tells_apart(
                     "other points seen",
                     &blind.reflected(side, eye, &before, light_count),

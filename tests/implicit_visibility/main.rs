@@ -19,6 +19,7 @@ mod passes;
 mod physics;
 mod shadows;
 mod sky;
+mod sky_spots;
 mod sweep;
 mod trees;
 mod twins;

@@ -53,7 +53,7 @@ impl Point {
 }
 
 /// The winners of the four bins around a direction.
-fn winners_around(row: &[u32], direction: Vec3, n: u32) -> Vec<u32> {
+pub fn winners_around(row: &[u32], direction: Vec3, n: u32) -> Vec<u32> {
     let axis = direction.abs().max_position();
     let across = [direction[(axis + 1) % 3], direction[(axis + 2) % 3]].map(|c| c / direction[axis].abs());
     let face = 2 * axis as u32 + u32::from(direction[axis] < 0.0);
@@ -67,10 +67,10 @@ fn winners_around(row: &[u32], direction: Vec3, n: u32) -> Vec<u32> {
 }
 
 /// What the elements and the emitters of a method see.
-struct Seen<'a> {
+pub struct Seen<'a> {
     method: &'a ImplicitVisibility,
-    rows: Vec<Vec<u32>>,
-    receivers: Vec<Receiver>,
+    pub rows: Vec<Vec<u32>>,
+    pub receivers: Vec<Receiver>,
     points: Vec<Point>,
     visible: Vec<u32>,
     /// The triangles around each vertex.
@@ -78,7 +78,7 @@ struct Seen<'a> {
 }
 
 impl<'a> Seen<'a> {
-    fn new(context: &TestContext, fixture: &Fixture, method: &'a ImplicitVisibility) -> Self {
+    pub fn new(context: &TestContext, fixture: &Fixture, method: &'a ImplicitVisibility) -> Self {
         let samples = context.download(&method.emitters().samples).unwrap();
         let mut around = vec![Vec::new(); fixture.rest_positions.len()];
         for triangle in &fixture.geometry.triangles {
@@ -107,7 +107,7 @@ impl<'a> Seen<'a> {
     }
 
     /// Whether what lies around one of the nodes, below the node two levels above it, crosses the way.
-    fn is_crossed(&self, nodes: &[u32], origin: Vec3, way: Vec3) -> bool {
+    pub fn is_crossed(&self, nodes: &[u32], origin: Vec3, way: Vec3) -> bool {
         let trees = &self.method.trees().topology;
         let topology = &self.method.elements().topology;
         nodes.iter().any(|&node| {

@@ -1,4 +1,4 @@
-//! A plane under a sky with a box on it: direct light against rays, by bins.
+//! A plane under a sky with a box on it: direct light against rays, by bins alone.
 
 use crate::common::scenes::{lambert, one_sided_box, parallelogram, scene};
 use crate::common::{Random, TestContext};
@@ -64,7 +64,8 @@ fn the_sky_around_a_box_is_seen_the_better_the_more_bins() {
     let scale = reference.iter().map(|e| e.length_squared()).sum::<f32>() / reference.len() as f32;
 
     let error = |n: u32| {
-        let method = fixture.linked(&context, Settings { bins: n, smoothing: false, ..Settings::default() });
+        let method =
+            fixture.linked(&context, Settings { bins: n, smoothing: false, sky_spots: 0, ..Settings::default() });
         let direct = solve(&context, &method, &fixture.world, 0).direct;
         let (vectors, seen) = (bins::vectors(n), bins::radiance(&fixture.environment, n));
         let rows = winners(&context, &method);

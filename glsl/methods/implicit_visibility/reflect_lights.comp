@@ -2,12 +2,14 @@
 #include "lib/prelude.glsl"
 #include "lib/emitter.glsl"
 #include "lib/light.glsl"
+#include "lib/sky_spot.glsl"
 #include "methods/implicit_visibility/gloss.glsl"
 
-// One thread per (glossy leaf, direction): radiance that its specular lobe sends there, of points on emitters and of
-// punctual lights.                                                                                  [Dong2007 4.4]
+// One thread per (glossy leaf, direction): radiance that its specular lobe sends there, of points on emitters, of
+// punctual lights and of bright spots of the environment.                                           [Dong2007 4.4]
 // reads glossy_leaves, leaf_elements, element_vertices, element_positions, element_normals [element_count], lobes[vertex_count],
-// samples[sample_count], triangles, positions, emission, visible (bits), lights, visibility[light_count * element_count]
+// samples[sample_count], triangles, positions, emission, visible (bits), lights, visibility[light_count * element_count],
+// spots[spot_count], spots_seen (bits)
 // updates reflected[glossy leaf * directions] (W m^-2 sr^-1)   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer GlossyLeaves { uint glossy_leaves[]; };
@@ -24,12 +26,15 @@ layout(set = 0, binding = 10, scalar) readonly buffer Visible { uint visible[]; 
 layout(set = 0, binding = 11, scalar) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 12, scalar) readonly buffer Visibility { float visibility[]; };    // light-major
 layout(set = 0, binding = 13, scalar) buffer Reflected { vec3 reflected[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer Spots { SkySpot spots[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer SpotsSeen { uint spots_seen[]; };
 layout(push_constant, scalar) uniform Params {
     GlossTarget target;
     vec4 eye;               // position and 1, or the direction to an orthographic eye and 0
     uint element_count;
     uint sample_count;
     uint light_count;       // 0: the display adds what it sees of punctual lights itself
+    uint spot_count;
     uint bin_count;
 } params;
 
@@ -66,6 +71,12 @@ void main()
         vec3 arriving = light_irradiance(lights[light], position, to_light, distance_to_light);
         float weight = max(dot(normal, to_light), 0.0) * visibility[light * params.element_count + element];
         sum += brdf_value(s, to_eye, to_light) * arriving * weight;
+    }
+    words = (params.spot_count + 31) / 32;
+    for (uint k = 0; k < params.spot_count; ++k) {
+        bool is_seen = (spots_seen[element * words + k / 32] >> k % 32 & 1) != 0;
+        vec3 direction = spots[k].direction;
+        if (is_seen) sum += brdf_value(s, to_eye, direction) * spots[k].irradiance * max(dot(normal, direction), 0.0);
     }
     reflected[glossy * directions + i % directions] += sum;
 }

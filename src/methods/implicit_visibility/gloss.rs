@@ -209,7 +209,7 @@ impl ImplicitVisibility {
         if self.emitters.plan.linked_parts == 0 {
             recorder.fill(&s.node_radiosity, 0);
         }
-        let has_environment = self.environment.info.is_black == 0;
+        let has_environment = !self.sky.is_black();
         let reflected = &gloss.next;
         let (node_radiosity, specular, eye) = (&s.node_radiosity, None, None);
         self.reflect_bins(recorder, Reflection { node_radiosity, specular, has_environment, eye, reflected });
@@ -248,7 +248,7 @@ impl ImplicitVisibility {
                 winners: &window.winners,
                 receivers,
                 bin_vectors,
-                bin_radiance: &self.bin_radiance,
+                bin_radiance: &self.sky.bin_radiance,
                 node_radiosity: what.node_radiosity,
                 glossy_of_node: &self.gloss.glossy_of_node,
                 specular: what.specular.unwrap_or(&self.gloss.specular),
@@ -280,7 +280,8 @@ impl ImplicitVisibility {
     ) {
         let (target, eye, threads) = self.target(0..self.gloss.leaf_count(), eye);
         let sample_count = self.emitters.plan.samples.len() as u32;
-        if sample_count + light_count == 0 {
+        let (sky, spot_count) = (&self.sky, self.sky.spot_count);
+        if sample_count + light_count + spot_count == 0 {
             return;
         }
         let (elements, emitters) = (&self.elements, &self.emitters);
@@ -298,6 +299,8 @@ impl ImplicitVisibility {
             visible: &emitters.visible,
             lights: &world.lights,
             visibility: &self.state.visibility,
+            spots: &sky.spots,
+            spots_seen: &sky.spots_seen,
             reflected,
             params: passes::ReflectLightsParams {
                 target,
@@ -305,6 +308,7 @@ impl ImplicitVisibility {
                 element_count: elements.count,
                 sample_count,
                 light_count,
+                spot_count,
                 bin_count: self.settings.bin_count(),
             },
         };
@@ -328,7 +332,7 @@ impl ImplicitVisibility {
         } else {
             recorder.fill(&s.node_radiosity, 0);
         }
-        let has_environment = self.environment.info.is_black == 0;
+        let has_environment = !self.sky.is_black();
         let direct = Reflection { node_radiosity: &s.node_radiosity, specular: None, has_environment, eye, reflected };
         self.reflect_bins(recorder, direct);
         self.reflect_lights(recorder, world, 0, eye, reflected);

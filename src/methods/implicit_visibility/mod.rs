@@ -21,8 +21,9 @@
 //! Differs from [Dong2007]: neighbouring receivers find their senders by one walk over the trees, which a queue of pairs
 //! would only scatter; leaves fill all the bins whose centres see their own triangles and nodes above leaves those that see their
 //! ellipse, at the distance there, so that no light leaks where leaves are larger than bins, and nothing blocks beyond
-//! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small emitters are hidden by
-//! the surfaces of the winners around the way, of both ends (`shadows`); punctual lights cast shadow rays; glossy elements
+//! its outline; the winner's weight is the bin's (the paper's Eq. 5 is a setting); points on small emitters and what is
+//! bright in an environment are hidden by the surfaces of the winners around the way (`shadows`, `sky`); elements inside of
+//! things look from the open beside them, which rays find once (`stages::open_places`); punctual lights cast shadow rays; glossy elements
 //! send tables of directions along the links (`gloss`). Not done: mirrors sharper than a bin, holes of alpha masks.
 //!
 //! [Dong2007]: crate::methods::PAPERS
@@ -34,6 +35,7 @@ mod linking;
 mod report;
 mod settings;
 mod shadows;
+mod sky;
 mod views;
 pub mod windows;
 
@@ -45,18 +47,18 @@ pub use views::DebugView;
 use crate::gpu::shaders::elements::{EmittedRadiosity, EmittedRadiosityParams, FillUnresolved, FillUnresolvedParams};
 use crate::gpu::shaders::methods::implicit_visibility as passes;
 use crate::gpu::shaders::types::Ray;
-use crate::gpu::{Buffer, Context, GpuError, Recorder, Sampled};
+use crate::gpu::{Buffer, Context, GpuError, Recorder};
 use crate::methods::explicit_visibility::Stage;
 use crate::scene::charts::{self, Charts};
-use crate::scene::environment::Environment;
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::quadtree::{Quadtrees, topology::QuadtreeTopology};
-use crate::stages::world::{World, WorldEnvironment};
+use crate::stages::world::World;
 use crate::stages::{emitters::Emitters, punctual};
 use glam::Vec3;
 use gloss::Gloss;
 use linking::Sizes;
 use shadows::Shadows;
+use sky::Sky;
 
 /// The method on one scene.
 pub struct ImplicitVisibility {
@@ -69,10 +71,7 @@ pub struct ImplicitVisibility {
     shadows: Shadows,
     gloss: Gloss,
     state: State,
-    /// At the density of the bins.
-    environment: WorldEnvironment,
-    /// Mean over each bin along the world's axes, W m^-2 sr^-1.
-    bin_radiance: Buffer<Vec3>,
+    sky: Sky,
     report: Report,
 }
 
@@ -122,7 +121,11 @@ impl ImplicitVisibility {
 
         let sizes = Sizes::new(context, &tree_topology, &settings);
         let (count, light_count) = (topology.vertices.len(), world.light_count as usize);
-        let light_words = 8 * 3 + 1 + light_count + settings.emitter_samples.div_ceil(32) as usize + 1;
+        let light_words = 8 * 3
+            + 1
+            + light_count
+            + (settings.emitter_samples.div_ceil(32) + settings.sky_spots.div_ceil(32)) as usize
+            + 1;
         let ray_bytes = BATCH_RAYS * (size_of::<Ray>() + 4) * usize::from(light_count > 0);
         let needed = sizes.bytes()
             + Elements::bytes_needed(&topology)
@@ -148,10 +151,11 @@ impl ImplicitVisibility {
         }
         let gloss = Gloss::new(context, &trees, glossy, settings.glossy_bins)?;
         let state = State::new(context, &elements, &trees, world.light_count, !gloss.is_empty())?;
-        let n = settings.bins;
+        let sky = Sky::new(context, environment, &elements, &settings)?;
         Ok(Self {
             report: Report {
                 glossy: gloss.leaf_count(),
+                sky_spots: sky.spot_count,
                 ..Report::new(&settings, &charts, &elements, &trees, &linking)
             },
             charts,
@@ -162,8 +166,7 @@ impl ImplicitVisibility {
             shadows,
             gloss,
             state,
-            environment: WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?,
-            bin_radiance: context.upload("implicit/bin radiance", &bins::radiance(environment, n))?,
+            sky,
             settings,
         })
     }
@@ -189,6 +192,7 @@ impl ImplicitVisibility {
             self.survey(recorder);
             let seen_by = (&self.trees, &self.elements, &self.emitters);
             self.shadows.see_emitters(recorder, world, seen_by, &self.linking, &self.settings);
+            self.sky.see(recorder, (&self.trees, &self.elements), &self.linking, &self.settings);
             let State { rays, is_free, visibility, .. } = &self.state;
             self.report.light_rays =
                 punctual::trace_visibility(recorder, &stage.tracer, world, &self.elements, rays, is_free, visibility);
@@ -226,14 +230,6 @@ impl ImplicitVisibility {
             };
             recorder.dispatch(&pass, leaves.len());
         }
-    }
-
-    /// Another environment; links stay.
-    pub fn set_environment(&mut self, context: &Context, environment: &Environment) -> Result<(), GpuError> {
-        let n = self.settings.bins;
-        self.environment = WorldEnvironment::new(context, &environment.averaged(4 * n, 2 * n))?;
-        self.bin_radiance = context.upload("implicit/bin radiance", &bins::radiance(environment, n))?;
-        Ok(())
     }
 
     /// Takes over the world's present materials; links stay. Emission may change as long as the same parts emit in
@@ -280,7 +276,7 @@ impl ImplicitVisibility {
             self.gather(recorder, Sent::Emitted);
             elements.add(recorder, &s.irradiance, &s.direct);
         }
-        if self.environment.info.is_black == 0 {
+        if !self.sky.is_black() {
             self.gather_environment(recorder);
             elements.add(recorder, &s.irradiance, &s.direct);
         }
@@ -334,31 +330,6 @@ impl ImplicitVisibility {
             recorder.dispatch(&pass, leaves.len());
         }
         self.fill_unresolved(recorder, &s.irradiance);
-    }
-
-    /// `irradiance` of all elements from the environment through their empty bins.               [Dong2007 4.4]
-    fn gather_environment(&self, recorder: &mut Recorder<'_>) {
-        recorder.fill(&self.state.irradiance, 0);
-        for window in &self.linking.windows {
-            let leaves = window.plan.leaves();
-            let pass = passes::Environment {
-                winners: &window.winners,
-                receivers: &self.linking.receivers,
-                leaf_elements: &self.trees.leaf_elements,
-                bin_vectors: &self.linking.bin_vectors,
-                bin_radiance: &self.bin_radiance,
-                environment_info: &self.environment.info_buffer,
-                environment_map: Sampled { image: &self.environment.map, sampler: &self.environment.sampler },
-                irradiance: &self.state.irradiance,
-                params: passes::EnvironmentParams {
-                    first_leaf: leaves.start,
-                    leaf_count: leaves.len() as u32,
-                    n: self.settings.bins,
-                    is_turned: u32::from(self.settings.is_turned()),
-                },
-            };
-            recorder.dispatch(&pass, leaves.len());
-        }
     }
 
     /// Elements inside other things take over their neighbours' light.

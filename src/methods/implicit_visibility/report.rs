@@ -25,6 +25,8 @@ pub struct Report {
     pub links_kept: u64,
     /// Elements that send their specular lobe.
     pub glossy: u32,
+    /// Directions that stand for what is bright in the environment.
+    pub sky_spots: u32,
     /// Bytes of all winners.
     pub winner_bytes: u64,
     /// Shadow rays to punctual lights.

@@ -59,6 +59,9 @@ crate::settings! {
         /// Points on sampled emitters, together; each is hidden by the surfaces that the bins around the way to it name, of the
         /// element and of the emitter.
         emitter_samples: u32 = 64, range 1..=1024, unit "points", paper "not given";
+        /// Directions that stand for what is bright in the environment, at most; each is hidden by the surfaces that the bins
+        /// around it name. With 0 all of the environment comes through the bins.
+        sky_spots: u32 = 64, range 0..=1024, unit "directions", paper "0";
         /// Surfaces that reflect at least so much at normal incidence are glossy: they send their lobe along; 2 for none.
         glossy: f32 = 0.1, range 0.0..=2.0, paper "all";
         /// Directions along each side of a face of the cube in which glossy elements and nodes send.

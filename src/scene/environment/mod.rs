@@ -9,8 +9,11 @@
 //! around the seam too. [`sampling`] chooses directions by importance. Loading is in [`load`].
 
 mod average;
+mod bright;
 pub mod load;
 pub mod sampling;
+
+pub use bright::Spot;
 
 use std::f32::consts::{PI, TAU};
 

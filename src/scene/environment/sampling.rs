@@ -170,7 +170,7 @@ fn bilinear_luminance(map: &EnvironmentMap, x: u32, y: u32) -> f64 {
 }
 
 /// Rec. 709 luminance.
-fn luminance(radiance: Vec3) -> f64 {
+pub(super) fn luminance(radiance: Vec3) -> f64 {
     let [r, g, b] = radiance.to_array().map(f64::from);
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
