@@ -38,6 +38,10 @@ pub enum ImplicitError {
     #[error(transparent)]
     HiddenParts(#[from] HiddenPartsError),
     #[error(
+        "walks over the trees did not end in {rounds} rounds: the device computes wrongly; try --validate, or another --gpu"
+    )]
+    Endless { rounds: u32 },
+    #[error(
         "implicit visibility needs {needed} bytes for {elements} elements with {bins} bins each, {available} are \
          available; lower --elements or bins"
     )]
@@ -175,10 +179,14 @@ impl Linking {
             let mut first_group = 0;
             for groups in window.plan.groups.concat().chunks(self.group_walks.len().max(1)) {
                 let group_count = groups.len() as u32;
-                let mut is_start = true;
-                // Walks with more senders than a group holds take several rounds.
-                while is_start || context.download(&self.unfinished)?[0] != 0 {
+                // Walks with more senders than a group holds take several rounds, and a walk that stops has filled a list.
+                let most_rounds = trees.topology.node_count() / CAPACITY + 1;
+                let mut rounds = 0;
+                while rounds == 0 || context.download(&self.unfinished)?[0] != 0 {
                     watch.step("links", done, rows)?;
+                    if rounds == most_rounds {
+                        return Err(ImplicitError::Endless { rounds });
+                    }
                     let mut recorder = context.recorder("implicit-visibility")?;
                     recorder.scope("create links", |recorder| {
                         self.create_links(
@@ -187,11 +195,11 @@ impl Linking {
                             window,
                             settings,
                             first_group..first_group + group_count,
-                            is_start,
+                            rounds == 0,
                         );
                     });
                     recorder.submit()?;
-                    is_start = false;
+                    rounds += 1;
                 }
                 done += groups.iter().map(|group| u64::from(group.count)).sum::<u64>();
                 first_group += group_count;
