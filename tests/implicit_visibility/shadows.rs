@@ -5,6 +5,7 @@ use crate::common::scenes::{lambert, one_sided_box, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene, winners};
 use crate::twins;
 use glam::{Quat, Vec3};
+use linklight::gpu::shaders::methods::implicit_visibility as passes;
 use linklight::gpu::shaders::types::{EmitterSample, Ray, Receiver};
 use linklight::methods::implicit_visibility::{ImplicitVisibility, Settings, bins};
 use linklight::scene::{Material, Scene};
@@ -106,12 +107,12 @@ impl<'a> Seen<'a> {
         self.method.trees().topology.leaf_elements.iter().position(|&element| vertices[element as usize] == entry)
     }
 
-    /// Whether what lies around one of the nodes, below the node two levels above it, crosses the way.
-    pub fn is_crossed(&self, nodes: &[u32], origin: Vec3, way: Vec3) -> bool {
+    /// Whether what lies around one of the nodes, below the node so many levels above it, crosses the way.
+    pub fn is_crossed(&self, nodes: &[u32], levels: u32, origin: Vec3, way: Vec3) -> bool {
         let trees = &self.method.trees().topology;
         let topology = &self.method.elements().topology;
         nodes.iter().any(|&node| {
-            let above = (0..2).fold(node, |node, _| trees.parent(node).unwrap_or(node));
+            let above = (0..levels).fold(node, |node, _| trees.parent(node).unwrap_or(node));
             trees.leaves(above).any(|leaf| {
                 let vertex = topology.vertices[trees.leaf_elements[leaf as usize] as usize] & !BACK_SIDE;
                 self.around[vertex as usize].iter().any(|&[a, b, c]| {
@@ -180,7 +181,7 @@ fn emitters_are_hidden_by_the_surfaces_of_winners() {
                 let own = winners_around(&seen.rows[leaf], frame(leaf) * way, 6);
                 let emitter = sides[k][usize::from(point.normal.dot(way) > 0.0)];
                 let back = winners_around(&seen.rows[emitter], frame(emitter) * -way, 6);
-                let reasons = [own, back].map(|nodes| seen.is_crossed(&nodes, at.origin, way));
+                let reasons = [own, back].map(|nodes| seen.is_crossed(&nodes, 2, at.origin, way));
                 alone[0] += usize::from(reasons == [true, false]);
                 alone[1] += usize::from(reasons == [false, true]);
                 let is_visible = seen.is_visible(leaf, k);
@@ -248,5 +249,42 @@ fn more_bins_see_as_rays_do() {
     });
     for pair in figures.windows(2) {
         assert!(pair[1][0] < 0.7 * pair[0][0] && pair[1][1] < 0.7 * pair[0][1], "{figures:?}");
+    }
+}
+
+/// Twin of `emitter_points`.
+#[test]
+fn points_on_emitters_lie_in_the_bundles_of_their_words() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, ball_and_lamp(), None);
+    let method = fixture.linked(&context, settings(4, 45));
+    let seen = Seen::new(&context, &fixture, &method);
+    let (points, bundles) = (context.buffer("points", 45).unwrap(), context.buffer("bundles", 2).unwrap());
+    let pass = passes::EmitterPoints {
+        samples: &method.emitters().samples,
+        triangles: &fixture.world.triangles,
+        positions: &fixture.world.positions,
+        points: &points,
+        bundles: &bundles,
+        params: passes::EmitterPointsParams { sample_count: 45, ray_offset: 0.01 },
+    };
+    let mut recorder = context.recorder("test").unwrap();
+    recorder.dispatch(&pass, 2u32);
+    recorder.submit().unwrap();
+    let (points, bundles) = (context.download(&points).unwrap(), context.download(&bundles).unwrap());
+    let boxes: Vec<[Vec3; 2]> = bundles.iter().map(|b| [b.middle - b.half_size, b.middle + b.half_size]).collect();
+    let mut tight = [[Vec3::INFINITY, Vec3::NEG_INFINITY]; 2];
+    for (k, (found, expected)) in points.iter().zip(&seen.points).enumerate() {
+        assert!(found.position.distance(expected.position) < 1e-5 && found.normal.distance(expected.normal) < 1e-5);
+        assert_eq!(found.is_double_sided != 0, expected.is_double_sided);
+        let ends =
+            [0.01, if expected.is_double_sided { -0.01 } else { 0.01 }].map(|off| found.position + off * found.normal);
+        for (least, most, end) in ends.map(|end| (boxes[k / 32][0], boxes[k / 32][1], end)) {
+            assert!(end.cmpge(least - 1e-6).all() && end.cmple(most + 1e-6).all(), "{end} outside {least} to {most}");
+        }
+        tight[k / 32] = [tight[k / 32][0].min(ends[0].min(ends[1])), tight[k / 32][1].max(ends[0].max(ends[1]))];
+    }
+    for (found, expected) in boxes.iter().zip(&tight) {
+        assert!(found[0].distance(expected[0]) + found[1].distance(expected[1]) < 1e-5, "{found:?} for {expected:?}");
     }
 }

@@ -62,7 +62,7 @@ fn bright_spots_are_hidden_by_the_surfaces_of_winners() {
                 continue;
             }
             let nodes = winners_around(&seen.rows[leaf], frame * spot.direction, 6);
-            let is_crossed = seen.is_crossed(&nodes, at.origin, 1e4 * spot.direction);
+            let is_crossed = seen.is_crossed(&nodes, 8, at.origin, 1e4 * spot.direction);
             differing += u32::from(is_seen == is_crossed);
             *(if is_seen { &mut visible } else { &mut hidden }) += 1;
             expected += spot.irradiance.as_dvec3() * f64::from(if is_seen { cosine } else { 0.0 });

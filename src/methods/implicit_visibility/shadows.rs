@@ -3,28 +3,34 @@
 
 use super::{ImplicitError, Linking, Settings};
 use crate::gpu::shaders::methods::implicit_visibility as passes;
+use crate::gpu::shaders::types::{Bundle, PointSeen};
 use crate::gpu::{Buffer, Context, Recorder};
 use crate::stages::elements::{BACK_SIDE, Elements};
 use crate::stages::emitters::Emitters;
 use crate::stages::quadtree::Quadtrees;
 use crate::stages::world::World;
-use glam::UVec2;
+use glam::UVec3;
 use std::collections::BTreeMap;
 
 /// What the leaves of emitters see.
 pub(super) struct Shadows {
-    /// Per sample: places in `leaves` of what is nearest to it, by the side that is seen: front, back.
-    slots: Buffer<UVec2>,
+    /// Per sample: its place among the 32 of its word, and places in `leaves` of what is nearest to it, by the side that is
+    /// seen: front, back. In each word those of one leaf follow each other.
+    slots: Buffer<UVec3>,
     leaves: Buffer<u32>,
     /// `6 n n` per leaf.
     winners: Buffer<u32>,
+    /// Where the samples are, and of each word of 32 the box that ways to them end in.
+    points: Buffer<PointSeen>,
+    bundles: Buffer<Bundle>,
 }
 
 impl Shadows {
     /// Bytes of the tables of [`Self::new`], at most.
     pub fn bytes_needed(settings: &Settings) -> u64 {
         let leaves = 2 * u64::from(settings.emitter_samples);
-        leaves * 4 * (u64::from(settings.bin_count()) + 2)
+        let points = u64::from(settings.emitter_samples) * (size_of::<PointSeen>() + size_of::<Bundle>()) as u64;
+        leaves * 4 * (u64::from(settings.bin_count()) + 2) + points
     }
 
     pub fn new(
@@ -49,19 +55,22 @@ impl Shadows {
             }) as u32)
         };
         let mut slots = Vec::with_capacity(emitters.plan.samples.len());
-        for sample in &emitters.plan.samples {
+        for (sample, k) in emitters.plan.samples.iter().zip(0..) {
             let [p, q] = sample.barycentrics.to_array();
             let nearest = if 1.0 - p - q >= p.max(q) { 0 } else { 1 + usize::from(q > p) };
             let vertex = triangles[sample.triangle as usize][nearest];
             // A vertex of a triangle with light has a leaf; a one-sided one is not seen from behind.
             let front = slot_of(vertex).unwrap_or(0);
-            slots.push(UVec2::new(front, slot_of(vertex | BACK_SIDE).unwrap_or(front)));
+            slots.push(UVec3::new(k % 32, front, slot_of(vertex | BACK_SIDE).unwrap_or(front)));
         }
+        slots.chunks_mut(32).for_each(|word| word.sort_by_key(|slot| slot.y));
         let bins = leaves.len() * settings.bin_count() as usize;
         Ok(Self {
             slots: context.upload("implicit/emitter slots", &slots)?,
             leaves: context.upload("implicit/emitter leaves", &leaves)?,
             winners: context.buffer("implicit/emitter winners", bins)?,
+            points: context.buffer("implicit/emitter points", slots.len())?,
+            bundles: context.buffer("implicit/bundles of emitter points", slots.len().div_ceil(32))?,
         })
     }
 
@@ -79,6 +88,15 @@ impl Shadows {
             return;
         }
         recorder.fill(&emitters.visible, 0);
+        let pass = passes::EmitterPoints {
+            samples: &emitters.samples,
+            triangles: &world.triangles,
+            positions: &world.positions,
+            points: &self.points,
+            bundles: &self.bundles,
+            params: passes::EmitterPointsParams { sample_count, ray_offset: elements.ray_offset },
+        };
+        recorder.dispatch(&pass, sample_count.div_ceil(32));
         let (count, bin_count) = (self.leaves.len() as u32, settings.bin_count());
         for window in &linking.windows {
             let leaves = window.plan.leaves();
@@ -101,9 +119,8 @@ impl Shadows {
                 winners: &window.winners,
                 receivers: &linking.receivers,
                 leaf_elements: &trees.leaf_elements,
-                samples: &emitters.samples,
-                triangles: &world.triangles,
-                positions: &world.positions,
+                points: &self.points,
+                bundles: &self.bundles,
                 sample_slots: &self.slots,
                 emitter_leaves: &self.leaves,
                 emitter_winners: &self.winners,
@@ -112,6 +129,7 @@ impl Shadows {
                 leaf_cells: &trees.leaf_cells,
                 corner_texels: &trees.corner_texels,
                 visible: &emitters.visible,
+                constants: passes::SeeEmittersConstants { is_turned: u32::from(settings.is_turned()) },
                 params: passes::SeeEmittersParams {
                     first_leaf: leaves.start,
                     leaf_count: leaves.len() as u32,
