@@ -4,23 +4,13 @@
 // octant, folded to the disc and lifted. Opposite directions lie in opposite bins.      [Shirley1997; octants as in Praun2003]
 // Bins 2p and 2p + 1 are opposite, the first looks up (+z). A direction is always that of propagation, at the sender and
 // at the receiver alike.
+#include "lib/hemisphere.glsl"
 
 // Bin of a unit direction; side = 2k.
 uint bin_of(vec3 w, uint side)
 {
-    float r = sqrt(max(1.0 - abs(w.z), 0.0));
-    vec2 p = vec2(0.0);
-    if (w.x != 0.0 || w.y != 0.0) {
-        // From the disc to the square: the inverse of concentric_disc.
-        if (abs(w.x) > abs(w.y)) {
-            p.x = w.x > 0.0 ? r : -r;
-            p.y = p.x * atan(w.y / w.x) * (4.0 / 3.14159265358979);
-        } else {
-            p.y = w.y > 0.0 ? r : -r;
-            p.x = p.y * atan(w.x / w.y) * (4.0 / 3.14159265358979);
-        }
-    }
-    uvec2 cell = min(uvec2(max((p * 0.5 + 0.5) * float(side), vec2(0.0))), uvec2(side - 1));
+    vec2 place = concentric_square(w.xy, sqrt(max(1.0 - abs(w.z), 0.0)));
+    uvec2 cell = min(uvec2(max(place * float(side), vec2(0.0))), uvec2(side - 1));
     uint index = cell.y * side + cell.x;
     // Below, cells are counted from the end: there lies the one opposite to a cell above.
     return w.z < 0.0 ? 2 * (side * side - 1 - index) + 1 : 2 * index;

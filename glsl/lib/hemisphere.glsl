@@ -20,6 +20,22 @@ vec2 concentric_disc(vec2 u)
     return r * vec2(cos(phi), sin(phi));
 }
 
+// The place in the unit square that concentric_disc takes to distance `r` along the direction of `p`.
+vec2 concentric_square(vec2 p, float r)
+{
+    vec2 q = vec2(0.0);
+    if (p.x != 0.0 || p.y != 0.0) {
+        if (abs(p.x) > abs(p.y)) {
+            q.x = p.x > 0.0 ? r : -r;
+            q.y = q.x * atan(p.y / p.x) * (4.0 / PI);
+        } else {
+            q.y = p.y > 0.0 ? r : -r;
+            q.x = q.y * atan(p.x / p.y) * (4.0 / PI);
+        }
+    }
+    return 0.5 * q + 0.5;
+}
+
 // Cosine-weighted direction about +z from a point of the unit square: the disc lifted to the hemisphere.
 vec3 cosine_hemisphere(vec2 u)
 {

@@ -4,27 +4,11 @@
 //                                                                                                         [Shirley1997]
 #include "lib/hemisphere.glsl"
 
-// From the unit disc to the unit square: the inverse of concentric_disc.
-vec2 concentric_square(vec2 p)
-{
-    float r = min(sqrt(dot(p, p)), 1.0);
-    if (r == 0.0) return vec2(0.5);
-    vec2 q;
-    if (abs(p.x) > abs(p.y)) {
-        q.x = p.x > 0.0 ? r : -r;
-        q.y = q.x * atan(p.y / p.x) * (4.0 / PI);
-    } else {
-        q.y = p.y > 0.0 ? r : -r;
-        q.x = q.y * atan(p.x / p.y) * (4.0 / PI);
-    }
-    return 0.5 * q + 0.5;
-}
-
 // Where a unit direction lies, in cells. One below the horizon is taken to it.
 vec2 place_in_bins(vec3 w, uint side)
 {
     vec2 p = w.xy / sqrt(w.z >= 0.0 ? 1.0 + w.z : max(1.0 - w.z * w.z, 1e-12));
-    return float(side) * concentric_square(p);
+    return float(side) * concentric_square(p, min(sqrt(dot(p, p)), 1.0));
 }
 
 // Unit direction of a place, in cells.

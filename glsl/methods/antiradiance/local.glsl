@@ -6,7 +6,7 @@
 // params.damping.
 // A thread works through pairs of opposite bins: along one of them light arrives at the front, along the other it leaves it.
 
-const float PI = 3.14159265358979;
+#include "lib/hemisphere.glsl"
 #include "methods/antiradiance/floor.glsl"
 #include "methods/antiradiance/table.glsl"
 
