@@ -302,19 +302,24 @@ fn texel(
 ) -> Texel {
     let (mut area, mut position, mut normal, mut u, mut v) = (0.0, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let (mut local, mut squares) = (Vec2::ZERO, Vec2::ZERO);
-    for part in parts {
-        local += part.area * part.local;
-        squares += part.area * part.squares;
+    // What a step of a texel to the right and down is in space, on a part's triangle.
+    let steps = |part: &TexelPart| {
         let triangle = part.triangle as usize;
         let [a, b, c] = geometry.triangles[triangle].map(|vertex| positions[vertex as usize]);
         let [p, q, r] = atlas.corner_places[usize::from(is_back)][triangle];
         let (e1, e2) = (q - p, r - p);
-        let flat = e1.perp_dot(e2);
+        [(b - a) * e2.y - (c - a) * e1.y, (c - a) * e1.x - (b - a) * e2.x].map(|step| step / e1.perp_dot(e2))
+    };
+    for part in parts {
+        local += part.area * part.local;
+        squares += part.area * part.squares;
+        let [a, b, c] = geometry.triangles[part.triangle as usize].map(|vertex| positions[vertex as usize]);
+        let [right, down] = steps(part);
         area += part.area;
         position += part.area * part_point(geometry, positions, part);
         normal += part.area * (b - a).cross(c - a).normalize_or_zero();
-        u += part.area * ((b - a) * e2.y - (c - a) * e1.y) / flat;
-        v += part.area * ((c - a) * e1.x - (b - a) * e2.x) / flat;
+        u += part.area * right;
+        v += part.area * down;
     }
     if area <= 0.0 || area.is_nan() {
         return Texel { at, chart: 0, position, normal: Vec3::ZERO, area: 0.0, side_u: u, side_v: v, first_part: 0 };
@@ -338,8 +343,14 @@ fn texel(
     let centroid = position / area;
     let nearest = |a: Vec3, b: Vec3| if b.distance_squared(centroid) < a.distance_squared(centroid) { b } else { a };
     let stand = if is_cut { points().reduce(nearest).unwrap_or(centroid) } else { centroid };
-    // On a curved surface the centroid lies under it, and would be hidden by it: out to the part that stands highest.
-    let height = points().map(|point| (point - stand).dot(normal)).fold(0.0, f32::max);
+    // On a curved surface the centroid lies under it, and would be hidden by it, and a flat texel's corners would reach through
+    // a hollow one to its other side: out to the highest corner of any part, each a rectangle that spreads as far.
+    let highest = |part: &TexelPart| {
+        let half = (3.0 * (part.squares - part.local * part.local)).max(Vec2::ZERO).powf(0.5);
+        let [right, down] = steps(part).map(|step| step.dot(normal).abs());
+        (part_point(geometry, positions, part) - stand).dot(normal) + right * half.x + down * half.y
+    };
+    let height = parts.iter().map(highest).filter(|height| height.is_finite()).fold(0.0, f32::max);
     Texel { at, chart: 0, position: stand + height * normal, normal, area, side_u, side_v, first_part: 0 }
 }
 
@@ -388,6 +399,47 @@ mod tests {
                 assert!(right == NO_TEXEL || atlas.texels[right as usize].chart == texel.chart);
             }
         }
+    }
+
+    /// A tube, seen from both sides: flat texels of its inside keep inside, corners and all.
+    #[test]
+    fn texels_of_a_hollow_do_not_reach_through_it() {
+        use crate::scene::{Material, Mesh, Node, Primitive};
+        let ring = 96u32;
+        let at = |k: u32, height: f32| {
+            let (sin, cos) = (std::f32::consts::TAU * k as f32 / ring as f32).sin_cos();
+            Vec3::new(cos, height, sin)
+        };
+        let positions: Vec<Vec3> = (0..=ring).flat_map(|k| [at(k % ring, 0.0), at(k % ring, 1.0)]).collect();
+        let triangles =
+            (0..ring).flat_map(|k| [[2 * k, 2 * k + 1, 2 * k + 3], [2 * k, 2 * k + 3, 2 * k + 2]]).collect();
+        let count = positions.len();
+        let tube = Primitive {
+            normals: positions.iter().map(|p| Vec3::new(p.x, 0.0, p.z)).collect(),
+            tangents: vec![Vec3::Y.extend(1.0); count],
+            uv: [vec![Vec2::ZERO; count], vec![Vec2::ZERO; count]],
+            colors: vec![glam::Vec4::ONE; count],
+            positions,
+            triangles,
+            ..Primitive::default()
+        };
+        let scene = Scene {
+            materials: vec![Material { double_sided: true, ..Material::default() }],
+            meshes: vec![Mesh { primitives: vec![tube], ..Mesh::default() }],
+            nodes: vec![Node { mesh: Some(0), ..Node::default() }],
+            ..Scene::default()
+        };
+        let geometry = Geometry::flatten(&scene, 1 << 30).unwrap();
+        let positions = deform::world_positions(&geometry, &Pose::rest(&scene));
+        let atlas = Atlas::new(&scene, &geometry, &positions, Size::tight(24)).unwrap();
+        let is_inside = |texel: &&Texel| texel.normal.dot(Vec3::new(texel.position.x, 0.0, texel.position.z)) < 0.0;
+        let farthest = atlas.texels.iter().filter(is_inside).flat_map(|texel| {
+            let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+            corners.map(|(u, v)| (texel.position + u * texel.side_u + v * texel.side_v) * Vec3::new(1.0, 0.0, 1.0))
+        });
+        let farthest = farthest.map(Vec3::length).fold(0.0, f32::max);
+        println!("{} texels, the farthest corner of the inner ones at {farthest}", atlas.texels.len());
+        assert!(farthest > 0.9 && farthest < 1.0005, "{farthest}");
     }
 
     #[test]
