@@ -59,6 +59,7 @@ layout(push_constant, scalar) uniform Params {
     uint environment_samples;
     float chance_below;         // of the threshold
     float map_reach;            // checked maps are not asked of senders nearer than so many of their radii
+    float map_stretch;          // what maps see is looked over by rays this far from the receiver; pixels of a map
 } params;
 
 layout(constant_id = 2) const bool COMPACT = false;

@@ -70,6 +70,9 @@ crate::settings! {
         gather_visibility: Visibility = Visibility::Rays, paper "surface shadow maps";
         /// Checked maps are not asked of senders nearer than so many of their radii, rays are.
         gather_map_reach: f32 = 4.0, range 0.0..=1000.0, unit "radii", paper "not done";
+        /// What maps see is looked over by rays within so many widths of their pixels of the surface that sees: closer than
+        /// that they cannot tell what lies before an edge from what lies behind it. 0 asks maps alone.
+        gather_map_stretch: f32 = 1.0, range 0.0..=100.0, unit "pixels of a map", paper "not done";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
@@ -257,6 +260,7 @@ impl FinalGather {
                         environment_samples: if environment.info.is_black != 0 { 0 } else { settings.environment_samples },
                         chance_below: if settings.gather_jitter { settings.gather_chance } else { 0.0 },
                         map_reach: settings.gather_map_reach,
+                        map_stretch: settings.gather_map_stretch,
                     },
                     constants: $constants,
                 };
@@ -291,7 +295,7 @@ impl FinalGather {
                 map_frame: frame,
                 run_offsets: &maps.run_offsets,
                 runs: &maps.runs,
-                map_origins: &maps.origins,
+                map_stands: &maps.stands,
                 leaf_maps: leaf_maps,
                 rigid_words: &moving.words,
                 rigid_objects: &moving.present
@@ -306,7 +310,7 @@ impl FinalGather {
                 map_frame: &placed.frame,
                 run_offsets: &placed.maps.run_offsets,
                 runs: &placed.maps.runs,
-                map_origins: &placed.maps.origins,
+                map_stands: &placed.maps.stands,
                 leaf_maps: &placed.leaf_maps
             ),
             (Tracer::Compute(bvh, surfaces), None) => gather!(

@@ -54,6 +54,7 @@ const ALL_SEEN: Settings = Settings {
     gather_chance: 0.0,
     gather_visibility: Visibility::None,
     gather_map_reach: 0.0,
+    gather_map_stretch: 0.0,
     gather_jitter: false,
     gather_clamp: 0.0,
     environment_samples: 1,

@@ -25,7 +25,10 @@ fn show(
     gather_visibility: Visibility,
     gather_map_reach: f32,
 ) -> Shown {
-    let settings = final_gather::Settings { gather_visibility, gather_map_reach, ..Default::default() };
+    // Maps alone, where they are not checked.
+    let gather_map_stretch = 0.0;
+    let settings =
+        final_gather::Settings { gather_visibility, gather_map_reach, gather_map_stretch, ..Default::default() };
     fixture.show(context, method, settings, UVec2::new(48, 48))
 }
 
@@ -51,6 +54,55 @@ fn rays_where_maps_leave_doubt_mend_most_of_their_error() {
     println!("checked without maps: off by {:.2e}; {}", all.off(&rays), all.report);
     assert!(all.off(&rays) < 1e-5 && (all.report.mean_rays / rays.report.mean_rays - 1.0).abs() < 1e-4);
     assert!(show(&context, &prepared, Visibility::Checked, 4.0).indirect == checked.indirect, "the same to the bit");
+}
+
+/// A lamp behind a wall: pixels of maps are wider than what lies at the wall's foot, and see it from both sides. Short rays
+/// at the surface's end keep both the picture and the texels dark; the light on the lamp's side stays.
+#[test]
+fn what_lies_close_behind_a_wall_stays_dark() {
+    let context = TestContext::new();
+    let lamp = Material { emission: Vec3::splat(5.0), ..lambert(Vec3::ZERO) };
+    let primitives = vec![
+        parallelogram(Vec3::new(-4.0, 0.0, 4.0), Vec3::X * 8.0, Vec3::NEG_Z * 8.0, 1, 0),
+        parallelogram(Vec3::new(0.0, 0.0, -4.0), Vec3::Y * 2.0, Vec3::Z * 8.0, 1, 0),
+        parallelogram(Vec3::new(-3.0, 0.1, -1.0), Vec3::Y * 1.5, Vec3::Z * 2.0, 1, 1),
+    ];
+    let materials = vec![lambert(Vec3::splat(0.7)), lamp];
+    let fixture = Fixture::new(&context, scene(materials, primitives, &[]), &Environment::default());
+    let lit = |map_stretch: f32, visibility, gather_visibility| {
+        let settings = Settings { atlas_resolution: 48, map_resolution: 16, map_stretch, visibility, ..no_cache() };
+        let method = fixture.prepare(&context, settings);
+        fixture.solve(&context, &method, 0);
+        let settings =
+            final_gather::Settings { gather_visibility, gather_map_stretch: map_stretch, ..Default::default() };
+        let shown = fixture.show(&context, &method, settings, UVec2::new(64, 40));
+        let texels = context.download(method.direct_irradiance()).unwrap();
+        let sides = [-1.0, 1.0].map(|side| {
+            let of_side = method.atlas.texels.iter().zip(&texels).filter(|(texel, _)| side * texel.position.x > 0.02);
+            of_side.map(|(texel, light)| texel.area * light.x).sum::<f32>()
+        });
+        (shown, sides)
+    };
+    let (rays, [lit_by_rays, dark_by_rays]) = lit(1.0, TexelVisibility::Rays, Visibility::Rays);
+    let leak = |shown: &Shown| {
+        let dark = shown.direct.iter().zip(&rays.direct).filter(|(_, rays)| **rays == Vec3::ZERO);
+        dark.map(|(light, _)| light.x).sum::<f32>()
+    };
+    let (alone, [_, dark_alone]) = lit(0.0, TexelVisibility::Maps, Visibility::Maps);
+    let (maps, [lit_by_maps, dark_by_maps]) = lit(1.0, TexelVisibility::Maps, Visibility::Maps);
+    let (checked, _) = lit(1.0, TexelVisibility::Maps, Visibility::Checked);
+    println!("texels behind the wall: rays {dark_by_rays}, maps alone {dark_alone}, with short rays {dark_by_maps} W");
+    println!("before it: rays {lit_by_rays}, maps {lit_by_maps} W");
+    println!("picture: maps alone {}, with short rays {}, checked {}", leak(&alone), leak(&maps), leak(&checked));
+    // Texels across the wall's foot are lit on one side.
+    assert!(dark_alone > 0.1 + 10.0 * dark_by_rays && dark_by_maps - dark_by_rays < 0.06 * dark_alone);
+    assert!((lit_by_maps / lit_by_rays - 1.0).abs() < 0.02);
+    assert!(leak(&alone) > 0.1 && leak(&maps) < 0.08 * leak(&alone) && leak(&checked) < 0.02 * leak(&alone));
+    assert!(maps.report.mean_rays < rays.report.mean_rays);
+}
+
+fn no_cache() -> Settings {
+    Settings { keep_maps: false, ..Settings::default() }
 }
 
 /// Half of the maps do with twice the error, and what is checked doubts them as far as they stand from what they see for.

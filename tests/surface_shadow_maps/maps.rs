@@ -11,6 +11,8 @@ use linklight::stages::surface_maps::{
 use linklight::stages::work::{Interrupted, Unwatched, Watch};
 
 const SEQUENCES: [Sequence; 3] = [Sequence::Greedy, Sequence::ZigZag, Sequence::Spiral];
+/// With the one that looks at the maps.
+const ALL: [Sequence; 4] = [Sequence::Greedy, Sequence::ZigZag, Sequence::Spiral, Sequence::Sight];
 
 /// The first depth that its interval does not hold.
 fn first_wrong(maps: &SurfaceMaps, intervals: &[Interval]) -> Option<(usize, usize)> {
@@ -26,11 +28,13 @@ fn every_compressed_depth_answers_like_the_uncompressed_map() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("cornell-box"), &Environment::default());
     let atlas = fixture.atlas(32);
-    for (walk, until) in SEQUENCES.into_iter().flat_map(|walk| [(walk, MapUntil::Next), (walk, MapUntil::Lit)]) {
+    for (walk, until) in ALL.into_iter().flat_map(|walk| [(walk, MapUntil::Next), (walk, MapUntil::Lit)]) {
         let options = |resolution, walk| MapOptions { until, ..options(resolution, walk) };
-        let order = sequence::walk(&atlas, walk);
         let input = fixture.map_input(&atlas, None);
         let maps = SurfaceMaps::new(&context, input, options(8, walk), &Unwatched).unwrap();
+        let mut order: Vec<u32> = (0..atlas.texels.len() as u32).collect();
+        order.sort_by_key(|&texel| maps.places[texel as usize]);
+        assert_eq!(order == sequence::walk(&atlas, walk), walk != Sequence::Sight);
         let intervals = uncompressed(&context, input, options(8, walk), &order, &Unwatched).unwrap();
         assert_eq!(intervals.len(), order.len() * maps.maps.pixel_count());
         println!("{walk:?}, {until:?}: {} texels, {:.2} : 1", order.len(), maps.ratio());
@@ -56,7 +60,7 @@ impl Asked {
         intervals: &[Interval],
         choose: impl Iterator<Item = (u32, u32)>,
     ) -> Self {
-        let origins = context.download(&maps.origins).unwrap();
+        let origins: Vec<Vec3> = context.download(&maps.stands).unwrap().iter().map(|stand| stand.origin).collect();
         let mut asked = Self { queries: Vec::new(), expected: Vec::new() };
         for (place, pixel) in choose {
             let interval = intervals[place as usize * maps.maps.pixel_count() + pixel as usize];
@@ -143,7 +147,7 @@ fn drawn_pixels_are_the_filter_in_the_mean() {
     let atlas = fixture.atlas(32);
     let input = fixture.map_input(&atlas, None);
     let maps = SurfaceMaps::new(&context, input, options(8, Sequence::Spiral), &Unwatched).unwrap();
-    let origins = context.download(&maps.origins).unwrap();
+    let origins: Vec<Vec3> = context.download(&maps.stands).unwrap().iter().map(|stand| stand.origin).collect();
     let random = &mut Random(23);
     let count = 40_000;
     let queries: Vec<SurfaceMapQuery> = (0..count)
@@ -208,6 +212,55 @@ fn charts_compress_better_than_greedy_walks_and_more_so_when_finer() {
         assert!(spiral > before, "{spiral} after {before}");
         before = spiral;
     }
+}
+
+/// Where charts are of few texels, an order by what their maps see holds depths for longer than any walk within charts.
+#[test]
+fn small_charts_compress_better_by_sight() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("office"), &Environment::default());
+    let atlas = fixture.atlas(64);
+    let ratio = |walk| {
+        let maps = SurfaceMaps::new(&context, fixture.map_input(&atlas, None), options(16, walk), &Unwatched).unwrap();
+        maps.ratio()
+    };
+    let [spiral, sight] = [Sequence::Spiral, Sequence::Sight].map(ratio);
+    let (texels, charts) = (atlas.texels.len(), atlas.chart_count);
+    println!("{texels} texels in {charts} charts: spiral {spiral:.2}, sight {sight:.2} : 1");
+    assert!(sight > 1.1 * spiral, "{sight} and {spiral}");
+}
+
+/// Pixels below a map's plane are open, and any depth may stand there: a point at the foot of a wall, hardly above the plane,
+/// is not filtered over them.
+#[test]
+fn what_lies_below_a_map_is_never_asked() {
+    let context = TestContext::new();
+    let fixture = Fixture::new(&context, builtin_scene("furnace"), &Environment::default());
+    let atlas = fixture.atlas(32);
+    let input = fixture.map_input(&atlas, None);
+    let maps = SurfaceMaps::new(&context, input, options(16, Sequence::Spiral), &Unwatched).unwrap();
+    let [low, high] = fixture.bounds;
+    let middle = 0.5 * (low + high);
+    let floor = (0..atlas.texels.len()).filter(|&texel| atlas.texels[texel].normal.y > 0.9);
+    let off = |texel: &usize| (atlas.texels[*texel].position - middle).with_y(0.0).length();
+    let central = floor.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
+    let foot = low.y + 0.004 * (high.y - low.y);
+    let queries: Vec<SurfaceMapQuery> =
+        [(low.x, Vec3::X), (high.x, Vec3::NEG_X), (low.z, Vec3::Z), (high.z, Vec3::NEG_Z)]
+            .into_iter()
+            .map(|(at, normal)| {
+                let point = if normal.x != 0.0 { middle.with_x(at) } else { middle.with_z(at) };
+                SurfaceMapQuery { point: point.with_y(foot), normal, place: maps.places[central] }
+            })
+            .collect();
+    let buffer = context.upload("test/queries", &queries).unwrap();
+    let visibility = context.buffer("test/visibility", queries.len()).unwrap();
+    let mut recorder = context.recorder("test").unwrap();
+    maps.query(&mut recorder, &buffer, &visibility, queries.len(), MapFilter::Four);
+    recorder.submit().unwrap();
+    let seen: Vec<f32> = context.download(&visibility).unwrap();
+    println!("{seen:?}");
+    assert!(seen.iter().all(|&seen| seen > 0.999), "{seen:?}");
 }
 
 /// Wants no more work after so many steps.

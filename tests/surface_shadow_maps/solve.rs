@@ -19,6 +19,7 @@ const SMALL: Settings = Settings {
     sequence: linklight::stages::surface_maps::Sequence::Spiral,
     map_bias: 1.0,
     map_sharing: 0.0,
+    map_stretch: 1.0,
     map_until: linklight::stages::surface_maps::MapUntil::Next,
     map_filter: linklight::stages::surface_maps::MapFilter::Drawn,
     sender_filter: linklight::stages::surface_maps::MapFilter::Drawn,

@@ -32,6 +32,7 @@ layout(push_constant, scalar) uniform Params {
     float key;
     float white;
     uint operator;
+    float map_stretch;          // what maps see is looked over by rays this far from the receiver; pixels of a map
 } params;
 
 layout(constant_id = 2) const bool COMPACT = false;

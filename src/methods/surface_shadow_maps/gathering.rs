@@ -46,6 +46,7 @@ impl SurfaceShadowMaps {
                         key,
                         white: self.tone.white,
                         operator,
+                        map_stretch: self.settings.map_stretch,
                     },
                 };
                 recorder.dispatch(&pass, texels.count);
@@ -66,18 +67,26 @@ impl SurfaceShadowMaps {
                     map_frame: frame,
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
-                    map_origins: &maps.origins,
+                    map_stands: &maps.stands,
                     leaf_maps: leaf_maps,
                     rigid_words: &moving.words,
                     rigid_objects: &moving.present,
                 });
             }
-            (Some(PlacedMaps { maps, leaf_maps, frame, moving: None, .. }), _) => {
+            (Some(PlacedMaps { maps, leaf_maps, frame, moving: None, .. }), tracer) => {
+                let (Tracer::Compute(_, surfaces) | Tracer::RayQuery(_, surfaces)) = tracer;
                 gather!(GatherMaps, GatherMapsParams, {
-                    constants: passes::GatherMapsConstants { compact },
+                    constants: passes::GatherMapsConstants { alpha_test: surfaces.has_holes, compact },
+                    bvh_nodes: lit.bvh.nodes(),
+                    bvh_triangles: lit.bvh.triangles(),
+                    triangles: surfaces.triangles,
+                    triangle_materials: surfaces.triangle_materials,
+                    attributes: surfaces.attributes,
+                    materials: surfaces.materials,
+                    textures: surfaces.textures,
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
-                    map_origins: &maps.origins,
+                    map_stands: &maps.stands,
                     leaf_maps: leaf_maps,
                     map_frame: frame,
                 })

@@ -25,8 +25,9 @@
 //! Differs from [Ritschel2008]: light of near senders is measured by exact form factors of the texels' parallelograms, so
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
 //! direct light of emissive texels comes by the same walk; texels receive at points drawn all over their surface, since
-//! those of small charts are large; texels that stand close together may share a map
-//! ([`Settings::map_sharing`]).
+//! those of small charts are large; where a map sees, a ray looks over the last stretch before the receiver, where its pixels
+//! are too wide to tell what lies before an edge from what lies behind it ([`Settings::map_stretch`]); maps are ordered by
+//! what they see; texels that stand close together may share a map ([`Settings::map_sharing`]).
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
@@ -83,13 +84,16 @@ crate::settings! {
         /// Pixels a side of a depth cube map's face.
         map_resolution: u32 = 32, range 4..=256, unit "pixels", paper "32 or 64";
         /// How the texels are walked when maps are compressed.
-        sequence: Sequence = Sequence::Spiral, paper "spiral is best";
+        sequence: Sequence = Sequence::Sight, paper "spiral is best";
         /// How far depths keep from the surfaces they tell apart.
         map_bias: f32 = 0.05, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
         /// How far behind the first surface a depth of a map may be: what lets it hold for longer.
         map_until: MapUntil = MapUntil::Next, paper "next";
         /// Texels that face alike less than so many texels apart look through one map: fewer maps where charts are small.
         map_sharing: f32 = 0.0, range 0.0..=8.0, unit "texels", paper "0: one each";
+        /// What maps see is looked over by rays within so many widths of their pixels of the texel that sees; 0 asks maps
+        /// alone.
+        map_stretch: f32 = 1.0, range 0.0..=100.0, unit "pixels of a map", paper "not done";
         /// How look-ups are filtered between pixels of a map.
         map_filter: MapFilter = MapFilter::Drawn, paper "not given";
         /// How look-ups are filtered between a sender's texel and those beside it, where points on senders are drawn.

@@ -23,11 +23,12 @@ impl Interval {
         (self.low..=self.high).contains(&depth)
     }
 
-    /// In the middle, as far as can be from both surfaces; or behind the first by half a pixel's width of a fine map, where the
-    /// second is that far: what stands between both beside the pixel's ray is hidden then.
-    fn depth(self, is_near: bool) -> u16 {
+    /// In the middle, as far as can be from both surfaces; or behind the first by the share `behind` of its distance, where
+    /// the second is farther: what stands between both beside the pixel's ray is hidden then.
+    fn depth(self, behind: Option<f32>) -> u16 {
         let middle = self.low.midpoint(self.high);
-        if is_near { middle.min(self.low.saturating_add(self.low / 64 + 1)) } else { middle }
+        let near = |behind| self.low.saturating_add((f32::from(self.low) * behind) as u16 + 1);
+        behind.map_or(middle, |behind| middle.min(near(behind)))
     }
 
     fn intersection(self, other: Self) -> Option<Self> {
@@ -55,7 +56,8 @@ const PIXEL_BLOCK: usize = 256;
 pub struct Compressor {
     pixels: Vec<PixelRuns>,
     place_count: usize,
-    is_near: bool,
+    /// Of the first surface's distance, how far behind it depths stand.
+    behind: Option<f32>,
 }
 
 #[derive(Clone)]
@@ -66,11 +68,11 @@ struct PixelRuns {
 }
 
 impl PixelRuns {
-    fn push(&mut self, place: u16, next: Interval, is_near: bool) {
+    fn push(&mut self, place: u16, next: Interval, behind: Option<f32>) {
         match self.open.intersection(next) {
             Some(both) => self.open = both,
             None => {
-                self.runs.push(Run { depth: self.open.depth(is_near), first: self.first });
+                self.runs.push(Run { depth: self.open.depth(behind), first: self.first });
                 self.open = next;
                 self.first = place;
             }
@@ -88,14 +90,10 @@ pub struct CompressedMaps {
 }
 
 impl Compressor {
-    pub fn new(pixel_count: usize) -> Self {
+    /// Depths stand in the middle, or such a share of the first surface's distance `behind` that where that is nearer.
+    pub fn new(pixel_count: usize, behind: Option<f32>) -> Self {
         let pixel = PixelRuns { runs: Vec::new(), open: Interval::ANY, first: 0 };
-        Self { pixels: vec![pixel; pixel_count], place_count: 0, is_near: false }
-    }
-
-    /// Depths are taken close behind the first surface, not in the middle.
-    pub fn near(self) -> Self {
-        Self { is_near: true, ..self }
+        Self { pixels: vec![pixel; pixel_count], place_count: 0, behind }
     }
 
     /// Appends whole maps, one after the other; at most [`MAX_PLACES`] in all.
@@ -104,7 +102,7 @@ impl Compressor {
         let first_place = self.place_count;
         debug_assert!(maps.len().is_multiple_of(pixel_count) && first_place + maps.len() / pixel_count <= MAX_PLACES);
         self.place_count += maps.len() / pixel_count.max(1);
-        let is_near = self.is_near;
+        let behind = self.behind;
         // Map after map over a block of pixels: what is read lies in one piece, what is written stays at hand.
         self.pixels.par_chunks_mut(PIXEL_BLOCK).enumerate().for_each(|(block, pixels)| {
             for (k, map) in maps.chunks_exact(pixel_count).enumerate() {
@@ -112,7 +110,7 @@ impl Compressor {
                 pixels
                     .iter_mut()
                     .zip(&map[block * PIXEL_BLOCK..])
-                    .for_each(|(pixel, &next)| pixel.push(place, next, is_near));
+                    .for_each(|(pixel, &next)| pixel.push(place, next, behind));
             }
         });
     }
@@ -127,7 +125,7 @@ impl Compressor {
         let mut maps = CompressedMaps { offsets: vec![0], runs: Vec::new(), place_count: self.place_count as u32 };
         for mut pixel in self.pixels {
             if self.place_count > 0 {
-                pixel.runs.push(Run { depth: pixel.open.depth(self.is_near), first: pixel.first });
+                pixel.runs.push(Run { depth: pixel.open.depth(self.behind), first: pixel.first });
             }
             maps.runs.extend(pixel.runs);
             maps.offsets.push(maps.runs.len() as u32);
@@ -271,7 +269,7 @@ mod tests {
     fn runs_are_the_fewest_and_hold() {
         for seed in 0..300 {
             let signal = signal(seed, 1 + seed as usize % 40);
-            let mut compressor = Compressor::new(1);
+            let mut compressor = Compressor::new(1, None);
             // In chunks of all lengths.
             for chunk in signal.chunks(1 + seed as usize % 7) {
                 compressor.push(chunk);
@@ -294,7 +292,7 @@ mod tests {
     fn packed_runs_hold_the_same_depths() {
         for (length, count) in [(1, 1), (255, 2), (256, 3), (257, 2), (1000, 4)] {
             let signals: Vec<Vec<Interval>> = (0..count).map(|pixel| signal(pixel + 70, length)).collect();
-            let mut compressor = Compressor::new(count as usize);
+            let mut compressor = Compressor::new(count as usize, None);
             for place in 0..length {
                 compressor.push(&signals.iter().map(|signal| signal[place]).collect::<Vec<_>>());
             }
@@ -319,7 +317,7 @@ mod tests {
     fn pixels_do_not_mix() {
         let (a, b) = (signal(5, 50), signal(6, 50));
         let maps: Vec<Interval> = a.iter().zip(&b).flat_map(|(&a, &b)| [a, b]).collect();
-        let mut compressor = Compressor::new(2);
+        let mut compressor = Compressor::new(2, None);
         compressor.push(&maps);
         let bytes = compressor.size_bytes();
         let maps = compressor.finish();
@@ -328,6 +326,6 @@ mod tests {
         for place in 0..50 {
             assert!(a[place].contains(maps.depth(place as u32, 0)) && b[place].contains(maps.depth(place as u32, 1)));
         }
-        assert_eq!(Compressor::new(3).finish().runs.len(), 0);
+        assert_eq!(Compressor::new(3, None).finish().runs.len(), 0);
     }
 }

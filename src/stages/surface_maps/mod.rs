@@ -23,6 +23,7 @@ mod outside;
 mod placed;
 pub mod sequence;
 mod sharing;
+mod sight;
 
 pub use cache::{Found, Key};
 pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, PackedRuns, Run};
@@ -34,13 +35,15 @@ pub use sharing::Sharing;
 use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
 use crate::gpu::shaders::surface_maps as passes;
-use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
+use crate::gpu::shaders::types::{Hit, MapStand, Ray, SurfaceMapFrame, SurfaceMapQuery};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::scene::atlas::Atlas;
 use glam::Vec3;
 use std::ops::Range;
 use std::path::Path;
 
+/// How far behind the first surface depths stand where the next lit one is farther, of its distance.
+const LIT_BEHIND: f32 = 1.0 / 64.0;
 /// Rays that are cast together.
 const CHUNK_RAYS: usize = 1 << 19;
 
@@ -101,8 +104,8 @@ pub struct SurfaceMaps {
     pub maps: CompressedMaps,
     /// Place in the sequence of the map that each texel looks through.
     pub places: Vec<u32>,
-    /// Where the maps stand, by place, metres.
-    pub origins: Buffer<Vec3>,
+    /// Where the maps stand, by place.
+    pub stands: Buffer<MapStand>,
     pub run_offsets: TexelBuffer,
     pub runs: TexelBuffer,
     /// How the runs lie in both.
@@ -164,10 +167,18 @@ impl SurfaceMaps {
             // One object after the other.
             order.sort_by_key(|&texel| objects[texel as usize]);
         }
-        let Sharing { order, places } = Sharing::new(input.atlas, &order, texel_objects, options.sharing);
-        if order.len() > MAX_PLACES {
-            return Err(SurfaceMapError::TooManyTexels { texels: order.len() });
+        let mut shared = Sharing::new(input.atlas, &order, texel_objects, options.sharing);
+        if shared.order.len() > MAX_PLACES {
+            return Err(SurfaceMapError::TooManyTexels { texels: shared.order.len() });
         }
+        if options.sequence == Sequence::Sight {
+            let mut order = sight::order(context, &input, options, &shared.order, watch)?;
+            if let Some(objects) = texel_objects {
+                order.sort_by_key(|&texel| objects[texel as usize]);
+            }
+            shared.reorder(order);
+        }
+        let Sharing { order, places } = shared;
         let Placement { origins, normals, offset, codes_per_metre } = Placement::new(&input, &order);
 
         let is_lit = options.until == MapUntil::Lit;
@@ -198,10 +209,12 @@ impl SurfaceMaps {
             }
         };
         let packed = PackedRuns::smallest(&maps);
+        let stands = origins.iter().zip(&normals).map(|(&origin, &normal)| MapStand { origin, normal });
+        let stands: Vec<MapStand> = stands.collect();
         Ok(Self {
             options,
             places,
-            origins: context.upload("surface_maps/origins", &origins)?,
+            stands: context.upload("surface_maps/stands", &stands)?,
             run_offsets: texels(context, "surface_maps/run offsets", &packed.offsets)?,
             runs: texels(context, "surface_maps/runs", &packed.words)?,
             packing: Packing::of(&packed),
@@ -246,6 +259,7 @@ impl SurfaceMaps {
             block_bits: self.packing.block_bits,
             block_count: self.packing.block_count,
             firsts_at: self.packing.firsts_at,
+            near_share: 0.0,
         }
     }
 
@@ -260,7 +274,7 @@ impl SurfaceMaps {
     ) {
         let pass = passes::Query {
             queries,
-            map_origins: &self.origins,
+            map_stands: &self.stands,
             run_offsets: &self.run_offsets,
             runs: &self.runs,
             visibility,
@@ -369,8 +383,10 @@ struct RayLists {
 impl Maker<'_> {
     fn make(&self, origins: &[Vec3], normals: &[Vec3], watch: &dyn Watch) -> Result<CompressedMaps, SurfaceMapError> {
         let allowed = self.context.limits().storage_buffer_bytes;
-        let compressor = Compressor::new(6 * (self.options.resolution as usize).pow(2));
-        let mut compressor = if self.lit_only { compressor.near() } else { compressor };
+        let resolution = self.options.resolution;
+        // Where a pixel's own ray meets a slope that it is wide enough to see differs by its width.
+        let behind = if self.lit_only { LIT_BEHIND } else { 2.0 / resolution as f32 };
+        let mut compressor = Compressor::new(6 * (resolution as usize).pow(2), Some(behind));
         let mut done = 0;
         self.intervals(origins, normals, watch, |maps, count| {
             compressor.push(maps);

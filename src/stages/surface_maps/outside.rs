@@ -213,7 +213,7 @@ fn make(
     let rays: Buffer<Ray> = context.buffer("outside maps/rays", 2 * chunk as usize * pixels)?;
     let hits: Buffer<Hit> = context.buffer("outside maps/hits", rays.len())?;
     let intervals: Buffer<u32> = context.buffer("outside maps/intervals", chunk as usize * pixels)?;
-    let mut compressor = Compressor::new(pixels);
+    let mut compressor = Compressor::new(pixels, None);
     for first_direction in (0..place_count).step_by(chunk as usize) {
         watch.step("outside maps", first_direction.into(), place_count.into())?;
         let chunk_count = chunk.min(place_count - first_direction);

@@ -15,15 +15,17 @@ crate::choice! {
         ZigZag = "zig-zag",
         /// Along the border of each chart and inwards, stepping back when stuck
         Spiral = "spiral",
+        /// To the map close by that is most alike, as small maps made before tell; charts or not
+        Sight = "sight",
     }
 }
 
-/// Indices of all texels, each once, in the order of the walk.
+/// Indices of all texels, each once, in the order of the walk; of [`Sequence::Sight`], the one that it starts from.
 pub fn walk(atlas: &Atlas, sequence: Sequence) -> Vec<u32> {
     match sequence {
         Sequence::Greedy => greedy(&atlas.texels),
         Sequence::ZigZag => by_chart(atlas, zig_zag),
-        Sequence::Spiral => by_chart(atlas, spiral),
+        Sequence::Spiral | Sequence::Sight => by_chart(atlas, spiral),
     }
 }
 

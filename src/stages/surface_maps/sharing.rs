@@ -35,6 +35,13 @@ impl Sharing {
         let places = keepers.iter().map(|&keeper| place_of[keeper as usize]).collect();
         Self { order, places }
     }
+
+    /// The same maps in another order of theirs.
+    pub fn reorder(&mut self, order: Vec<u32>) {
+        let place_of: HashMap<u32, u32> = order.iter().copied().zip(0..).collect();
+        self.places.iter_mut().for_each(|place| *place = place_of[&self.order[*place as usize]]);
+        self.order = order;
+    }
 }
 
 /// Of each texel, whose map it looks through; the largest choose first.
