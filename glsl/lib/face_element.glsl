@@ -42,6 +42,7 @@ const uint SPLIT_RECEIVER = 1u;
 const uint SPLIT_SHOOTER = 2u;
 const uint SPLIT_BOTH = 3u;     // a self transfer: all pairs of its children
 const uint PAIR_WAITS = 4u;     // for elements: the pool is full, and the host makes it larger
+const uint IN_SHADOW = 0x40000000u; // of a decision to split, and of the halves' shooters: some ray was blocked
 const uint IS_LIGHT = 0x80000000u;  // of a shooter: an index of the table of lights
 
 struct PoolCounters {
@@ -90,6 +91,14 @@ float reach(FaceElement e, vec3 direction)
 {
     return e.half_extent.x * abs(dot(e.axis_x, direction)) + e.half_extent.y * abs(dot(e.axis_y, direction))
          + e.half_extent.z * abs(dot(e.axis_z, direction));
+}
+
+// From a place to an element's box, m2.
+float squared_distance(FaceElement e, vec3 x)
+{
+    vec3 d = x - e.center;
+    vec3 off = max(abs(vec3(dot(d, e.axis_x), dot(d, e.axis_y), dot(d, e.axis_z))) - e.half_extent, vec3(0.0));
+    return max(dot(off, off), 1e-20);
 }
 
 // Whether any face of `e` may look at anything in the box of `other`.

@@ -3,7 +3,7 @@
 
 use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::common::{Random, TestContext};
-use crate::fixture::{Fixture, leaves};
+use crate::fixture::{Fixture, leaves, received};
 use crate::physics::around;
 use glam::Vec3;
 use linklight::gpu::shaders::types::Ray;
@@ -146,5 +146,77 @@ fn parts_receive_what_rays_off_the_faces_say() {
         }
         assert!((total.by_rays / sent - 1.0).abs() < 0.02, "the room is closed: {} of {sent}", total.by_rays);
         assert!((total.solved / total.by_rays - 1.0).abs() < tolerance, "{} of {}", total.solved, total.by_rays);
+    }
+}
+
+/// A floor of side 2, a board at its middle and a lamp of its size above it: floor, board, lamp.
+fn below_a_lamp(board: (Vec3, Vec3), at: Vec3, lamp_height: f32) -> Scene {
+    let (x, z) = (Vec3::X, Vec3::Z);
+    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
+    let mut materials = vec![material(0.5), Material { double_sided: true, ..material(0.25) }, material(0.0)];
+    materials[2].emission = Vec3::ONE;
+    let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 32, 0);
+    let lamp = parallelogram(Vec3::new(-1.0, lamp_height, -1.0), 2.0 * x, 2.0 * z, 16, 2);
+    let (u, v) = board;
+    scene(materials, vec![floor, parallelogram(at - 0.5 * (u + v), u, v, 8, 1), lamp], &[])
+}
+
+/// Shadows too small to matter to one piece of a lamp are not lost to all of them together.
+#[test]
+fn no_light_comes_into_the_core_of_a_small_shadow() {
+    let context = TestContext::new();
+    let (height, side) = (0.2, 0.4);
+    let board = (Vec3::Z * side, Vec3::X * side);
+    let fixture = Fixture::new(&context, below_a_lamp(board, Vec3::Y * height, 2.0), None);
+    let method = fixture.solve(&context, Settings::default(), 0);
+    let (all, sides) = (leaves(&context, &method), context.download(method.state().triangle_leaves()).unwrap());
+    // Where the lamp's border is seen past none of the board's: half the board's side, less what its height lets in.
+    let core = 0.5 * side - (1.0 - 0.5 * side) * height / (2.0 - height);
+    let middle =
+        |t: usize| fixture.geometry.triangles[t].map(|v| fixture.positions[v as usize]).iter().sum::<Vec3>() / 3.0;
+    let (mut dark, mut lit, mut floor) = (0.0, 0.0, 0.0);
+    let mut faces = 0;
+    for (t, leaf) in sides.iter().enumerate().filter(|(t, _)| middle(*t).y < 1e-3) {
+        let light = f64::from(all[leaf.x as usize].direct.x);
+        if middle(t).abs().max_element() < core {
+            (dark, faces) = (dark + light, faces + 1);
+        }
+        (lit, floor) = (lit + light, floor + 1.0);
+    }
+    let (dark, lit) = (dark / f64::from(faces), lit / floor);
+    println!(
+        "{faces} faces in the core get {dark:.4} W/m2, the floor {lit:.4}, {} transfers",
+        method.report().transfers()
+    );
+    assert!(faces > 10 && dark < 0.05 * lit, "{dark} W/m2 in the core, {lit} on the floor");
+}
+
+/// A bar that hangs close below a lamp is lit by all of it that it sees, however coarse the threshold: neither takes the
+/// other for what its nodes see.
+#[test]
+fn a_bar_close_below_a_lamp_takes_its_light() {
+    let context = TestContext::new();
+    let (length, width, gap) = (1.0f32, 0.1f32, 0.05f32);
+    let fixture =
+        Fixture::new(&context, below_a_lamp((Vec3::Z * width, Vec3::X * length), Vec3::Y * (1.0 - gap), 1.0), None);
+    // Of a rectangle with a corner above the place.                                               [common ground]
+    let corner = |a: f64, b: f64| -> f64 {
+        let one = |a: f64, b: f64| a / (1.0 + a * a).sqrt() * (b / (1.0 + a * a).sqrt()).atan();
+        (one(a, b) + one(b, a)) / std::f64::consts::TAU
+    };
+    let cells = 64;
+    let at = |k: i32, side: f32| (f64::from(k) + 0.5 - 0.5 * f64::from(cells)) / f64::from(cells) * f64::from(side);
+    let gap = f64::from(gap);
+    let sees = |x: f64, z: f64| -> f64 {
+        [-1.0, 1.0].iter().flat_map(|s| [-1.0, 1.0].map(|t| corner((1.0 + s * x) / gap, (1.0 + t * z) / gap))).sum()
+    };
+    let mean: f64 = (0..cells * cells).map(|k| sees(at(k / cells, length), at(k % cells, width))).sum::<f64>();
+    let expected = f64::from(PI) * mean / f64::from(cells * cells) * f64::from(length * width);
+    for threshold in [2e-3, 1e-3, 3e-4] {
+        let method = fixture.solve(&context, Settings { threshold, ..Settings::default() }, 0);
+        let (power, _) =
+            received(&leaves(&context, &method), |e| e.albedo.x < 0.4 && e.albedo.x > 0.1 && e.axis_z.y > 0.5);
+        println!("the bar gets {power:.5} W at threshold {threshold:e}, expected {expected:.5}");
+        assert!((power / expected - 1.0).abs() < 0.05, "threshold {threshold:e}: {power} W, expected {expected} W");
     }
 }

@@ -4,7 +4,7 @@ use crate::common::Random;
 use crate::grown::{
     FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, as_words, check, flat, grown, random_vectors, vectors,
 };
-use crate::pair_twins;
+use crate::pair_twins::{self, IN_SHADOW};
 use crate::twins::{self, NONE, Vectors};
 use glam::{DVec3, Mat3, UVec2, Vec3};
 use linklight::gpu::shaders::methods::face_cluster as passes;
@@ -222,7 +222,9 @@ fn children_are_claimed_once_and_pairs_expanded() {
     ]
     .map(|(a, b)| UVec2::new(a as u32, b as u32))
     .to_vec();
-    let (pairs, decisions) = (&table[..7], [1u32, 1, 2, 3, 1, 0, 4, 1]);
+    // Marked: a shooter of a decision that is not, and one that waits.
+    let table: Vec<UVec2> = (0..8).map(|k| table[k] + UVec2::Y * if k % 5 == 1 { IN_SHADOW } else { 0 }).collect();
+    let (pairs, decisions) = (&table[..7], [1 | IN_SHADOW, 1, 2 | IN_SHADOW, 3, 1, 0, 4, 1]);
     for (capacity, room) in [(64usize, 3usize), (44, 2)] {
         let mut all = g.elements.clone();
         all.resize(64, bytemuck::Zeroable::zeroed());
@@ -272,13 +274,14 @@ fn children_are_claimed_once_and_pairs_expanded() {
         // The twin of `expand`: a split pair's children, the pair itself where it waits.
         let mut expected = Vec::new();
         for (&pair, &decision) in pairs.iter().zip(&decisions) {
+            let (decision, shadow, shooter) = (decision & !IN_SHADOW, decision & IN_SHADOW, pair.y & !IN_SHADOW);
             let halves = |e: u32| [found[e as usize].children, found[e as usize].children.wrapping_add(1)];
-            let split = if decision == pair_twins::SPLIT_SHOOTER { pair.y } else { pair.x };
+            let split = if decision == pair_twins::SPLIT_SHOOTER { shooter } else { pair.x };
             match decision {
                 pair_twins::DONE => {}
                 _ if decision == 4 || found[split as usize].children == NONE => expected.push(pair),
-                pair_twins::SPLIT_RECEIVER => expected.extend(halves(pair.x).map(|x| UVec2::new(x, pair.y))),
-                pair_twins::SPLIT_SHOOTER => expected.extend(halves(pair.y).map(|y| UVec2::new(pair.x, y))),
+                pair_twins::SPLIT_RECEIVER => expected.extend(halves(pair.x).map(|x| UVec2::new(x, shooter | shadow))),
+                pair_twins::SPLIT_SHOOTER => expected.extend(halves(shooter).map(|y| UVec2::new(pair.x, y | shadow))),
                 _ => expected.extend(halves(pair.x).iter().flat_map(|&x| halves(pair.x).map(|y| UVec2::new(x, y)))),
             }
         }

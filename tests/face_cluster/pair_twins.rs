@@ -10,6 +10,8 @@ pub const DONE: u32 = 0;
 pub const SPLIT_RECEIVER: u32 = 1;
 pub const SPLIT_SHOOTER: u32 = 2;
 pub const SPLIT_BOTH: u32 = 3;
+/// Of a decision, and of a shooter.
+pub const IN_SHADOW: u32 = 1 << 30;
 
 fn axes(e: &FaceElement) -> [DVec3; 3] {
     [e.axis_x, e.axis_y, e.axis_z].map(|axis| axis.as_dvec3())
@@ -102,6 +104,8 @@ pub struct Way {
     pub threshold: f64,
     pub bent_light: f64,
     pub rays_per_node: usize,
+    /// Where light is blocked: times the receiver's area that a shooter may have before it is split first.
+    pub wider: f32,
     pub functions: usize,
     pub by: Blockers,
 }
@@ -134,6 +138,8 @@ struct Reaching {
     is_dark: bool,
     /// The channel that errors are judged by.
     channel: usize,
+    /// What the pair says of blocked light.
+    shadow: u32,
 }
 
 impl Reaching {
@@ -157,9 +163,12 @@ impl Reaching {
         if let Some((_, decision)) = bent.into_iter().find(|(e, _)| e.is_some_and(bends)) {
             quotients.push(bend);
             if bend > 1.0 {
-                return Outcome::new(decision, quotients);
+                return Outcome::new(decision | self.shadow, quotients);
             }
         }
+        // Lamps' pairs say nothing.
+        let (is_pair, shadow) = (measured.is_some(), self.shadow);
+        let marked = |is_blocked: bool| split | if is_pair && is_blocked { IN_SHADOW } else { shadow };
         let is_small = stake <= 1.0;
         let shares = free(is_small);
         quotients.extend(&shares.quotients);
@@ -168,7 +177,7 @@ impl Reaching {
             let worth = if self.is_dark { 1.0 } else { WORTH_LOOKING_ON };
             quotients.push(stake / worth);
             if stake > worth && split != DONE {
-                return Outcome::new(split, quotients);
+                return Outcome::new(marked(true), quotients);
             }
             if is_small || measured.is_none() {
                 return Outcome::new(DONE, quotients);
@@ -187,6 +196,13 @@ impl Reaching {
             (0..way.functions).map(|k| [0, 1, 2].map(|c| on(k, c))).collect()
         };
         let arrives = arriving(&shares.of_nodes);
+        let sizes = self.at_nodes.iter().map(|of| of.iter().map(|v| v.length()).sum::<f64>()).collect::<Vec<_>>();
+        let all: f64 = sizes.iter().sum();
+        let seen = if all > 0.0 {
+            sizes.iter().zip(&shares.of_nodes).map(|(size, share)| size * share).sum::<f64>() / all
+        } else {
+            1.0
+        };
         if !is_small && !is_blocked && split != DONE {
             let said = |r: usize| -> f64 {
                 let normal = a.axis_z.as_dvec3() * vector_area(a);
@@ -197,7 +213,7 @@ impl Reaching {
             let error = (0..t.receiver_nodes).map(off).fold(0.0, f64::max);
             quotients.push(f64::from(a.most_albedo) * error / way.threshold);
             if *quotients.last().unwrap() > 1.0 {
-                return Outcome::new(split, quotients);
+                return Outcome::new(marked(seen < 0.999), quotients);
             }
         }
         let Some(measured) = measured.filter(|_| !is_small) else {
@@ -206,19 +222,12 @@ impl Reaching {
         // Neither is trusted where they differ by too much. Else what nodes keep is dimmed, or what they lack is lit, until all of it is as free as measured.
         let measured = measured();
         quotients.extend(&measured.quotients);
-        let sizes = self.at_nodes.iter().map(|of| of.iter().map(|v| v.length()).sum::<f64>()).collect::<Vec<_>>();
-        let all: f64 = sizes.iter().sum();
-        let seen = if all > 0.0 {
-            sizes.iter().zip(&shares.of_nodes).map(|(size, share)| size * share).sum::<f64>() / all
-        } else {
-            1.0
-        };
         let normal = a.axis_z.as_dvec3() * vector_area(a);
         let strongest = self.at_nodes.iter().flatten().map(|v| normal.dot(*v)).fold(0.0, f64::max);
         if split != DONE {
             quotients.push(f64::from(a.most_albedo) * (measured.mean - seen).abs() * strongest / way.threshold);
             if *quotients.last().unwrap() > 1.0 {
-                return Outcome::new(split, quotients);
+                return Outcome::new(marked(true), quotients);
             }
         }
         if measured.mean == 0.0 {
@@ -245,7 +254,7 @@ pub fn transport(
     elements: &[FaceElement],
     (nodes, normals): (&[Vec<Vec3>], &[Vec<Vec3>]),
     unshot: &[Vec<Vec3>],
-    [receiver, shooter]: [usize; 2],
+    ([receiver, shooter], shadow): ([usize; 2], u32),
     way: &Way,
 ) -> Outcome {
     let (a, b) = (&elements[receiver], &elements[shooter]);
@@ -278,17 +287,22 @@ pub fn transport(
         .collect();
     let (mut at_nodes, mut least, mut greatest) = (Vec::new(), Vec::new(), Vec::new());
     let mut quotients = Vec::new();
-    let mut nearness = |e: &FaceElement, x: DVec3| -> f64 {
-        let d = x - e.center.as_dvec3();
-        let off = DVec3::from_array(axes(e).map(|axis| d.dot(axis).abs())) - e.half_extent.as_dvec3();
-        let (squared, size) = (off.max(DVec3::ZERO).length_squared().max(1e-20), 0.5 * e.half_extent.as_dvec3());
-        quotients.push(squared / size.length_squared());
-        if squared < size.length_squared() { (f64::from(e.area) / (PI * squared)).min(1.0) } else { 0.0 }
+    // From a place to a box in half diagonals, and what the element may fill of the hemisphere.
+    let mut nearness = |e: &FaceElement, x: DVec3| -> [f64; 2] {
+        let (d, half) = (x - e.center.as_dvec3(), e.half_extent.as_dvec3());
+        let off = DVec3::from_array(axes(e).map(|axis| d.dot(axis).abs())) - half;
+        let squared = off.max(DVec3::ZERO).length_squared().max(1e-20);
+        let away = (squared / half.length_squared()).sqrt();
+        quotients.extend([2.0 * away, 0.5 * away]);
+        [away, if away < 0.5 { (f64::from(e.area) / (PI * squared)).min(1.0) } else { 0.0 }]
     };
-    let near_power = brightest * f64::from(b.area) * nearness(a, b.center.as_dvec3());
+    let near_power = brightest * f64::from(b.area) * nearness(a, b.center.as_dvec3())[1];
+    let mut is_far = true;
     for r in 0..t.receiver_nodes {
         let x = nodes[receiver][r].as_dvec3();
-        let around = if b.place_count == 1 { 0.0 } else { brightest * f64::from(a.area) * nearness(b, x) };
+        let [away, share] = nearness(b, x);
+        let around = if b.place_count == 1 { 0.0 } else { brightest * f64::from(a.area) * share };
+        is_far &= away > 2.0;
         let (mut vectors, mut sum) = ([DVec3::ZERO; 3], 0.0);
         let (mut low, mut high, mut sends) = (f64::INFINITY, near_power.max(around), false);
         for (e, rule) in shooter_rule.iter().enumerate() {
@@ -318,7 +332,7 @@ pub fn transport(
     }
     let strongest = unshot[shooter][0];
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
-    let reaching = Reaching { at_nodes, least, greatest, is_dark: false, channel };
+    let reaching = Reaching { at_nodes, least, greatest, is_dark: false, channel, shadow };
     let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
     let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
     let ends = Ends {
@@ -328,9 +342,10 @@ pub fn transport(
     };
     let free = |is_small: bool| free_ways(t, &ends, way, false, is_small);
     let measured = || free_ways(t, &ends, way, true, false);
+    let wider = if is_far && shadow != 0 { way.wider } else { 1.0 };
     let split = match (can_split(a), can_split(b)) {
         (false, false) => DONE,
-        (true, is_b) if a.area >= b.area || !is_b => SPLIT_RECEIVER,
+        (true, is_b) if wider * a.area >= b.area || !is_b => SPLIT_RECEIVER,
         _ => SPLIT_SHOOTER,
     };
     let mut outcome = reaching.decided((t, &nodes[receiver]), (a, Some(b)), way, free, Some(&measured), split);
@@ -407,6 +422,7 @@ pub fn transport_light(
         least,
         greatest: greatest.clone(),
         is_dark: (0..t.receiver_nodes).all(is_dark),
+        shadow: 0,
     };
     let passed = [[a.first_place, a.place_count], [0, 0]];
     let ray = |r: usize| {

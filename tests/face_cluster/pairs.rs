@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::grown::{FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, check, flat, grown_over};
-use crate::pair_twins::{self, Outcome, Way};
+use crate::pair_twins::{self, IN_SHADOW, Outcome, Way};
 use crate::way_twins::Blockers;
 use glam::{UVec2, Vec3};
 use linklight::gpu::Buffer;
@@ -32,7 +32,7 @@ fn compare_outcomes(
     for (&i, &found) in clear.iter().zip(&g.read(&decisions)) {
         let Outcome { decision, arrives, quotients } = &outcomes[i];
         assert_eq!(found, *decision, "pair {}: {quotients:?}", pairs[i]);
-        counts[if arrives.is_some() { 4 } else { found as usize }] += 1;
+        counts[if arrives.is_some() { 4 } else { (found & !IN_SHADOW) as usize }] += 1;
         if let Some(arrives) = arrives {
             let first = pairs[i].x as usize * FUNCTIONS * 9;
             sums[first..].iter_mut().zip(flat(arrives)).for_each(|(sum, v)| *sum += v);
@@ -56,19 +56,25 @@ fn pairs_are_transported_or_split() {
             vec![first, first * 0.3 * (random.unit() - 0.5), first * 0.3 * (random.unit() - 0.5)]
         })
         .collect();
-    let pairs: Vec<UVec2> = (0..count as u32).flat_map(|a| (0..count as u32).map(move |b| UVec2::new(a, b))).collect();
+    // Two thirds come of pairs that were partly blocked.
+    let shadow = |a: u32, b: u32| if (a + b).is_multiple_of(3) { 0 } else { IN_SHADOW };
+    let all = 0..count as u32;
+    let pairs: Vec<UVec2> =
+        all.clone().flat_map(|a| all.clone().map(move |b| UVec2::new(a, b | shadow(a, b)))).collect();
     let flat_unshot: Vec<Vec3> = unshot.iter().flatten().copied().collect();
     let flat_nodes: Vec<Vec3> = g.nodes.iter().flatten().copied().collect();
     let (p, world, units) = (g.method.placement(), &g.fixture.world, 1e7f32);
     let normals = g.read_normals();
-    for (by, rays_per_node, threshold, step) in
-        [(Blockers::Triangles, 1, 2e-3, 1), (Blockers::Triangles, 3, 2e-2, 3), (Blockers::Clusters, 1, 5e-3, 3)]
-    {
-        let way = Way { threshold, bent_light: BENT_LIGHT, rays_per_node, functions: FUNCTIONS, by };
+    for (by, rays_per_node, wider, threshold, step) in [
+        (Blockers::Triangles, 1, 16.0, 2e-3, 1),
+        (Blockers::Triangles, 3, 1.0, 2e-2, 3),
+        (Blockers::Clusters, 1, 6.0, 5e-3, 3),
+    ] {
+        let way = Way { threshold, bent_light: BENT_LIGHT, rays_per_node, wider, functions: FUNCTIONS, by };
         let pairs: Vec<UVec2> = pairs.iter().step_by(step).copied().collect();
         let of = |pair: &UVec2| {
-            let pair = [pair.x as usize, pair.y as usize];
-            pair_twins::transport(&g.tables, &g.elements, (&g.nodes, &normals), &unshot, pair, &way)
+            let (ends, shadow) = ([pair.x as usize, (pair.y & !IN_SHADOW) as usize], pair.y & IN_SHADOW);
+            pair_twins::transport(&g.tables, &g.elements, (&g.nodes, &normals), &unshot, (ends, shadow), &way)
         };
         let outcomes: Vec<Outcome> = pairs.iter().map(of).collect();
         compare_outcomes(&g, &pairs, &outcomes, units, |taken, arriving, decisions, pool| {
@@ -103,6 +109,7 @@ fn pairs_are_transported_or_split() {
                     bent_light: BENT_LIGHT as f32,
                     units,
                     rays_per_node: rays_per_node as u32,
+                    wider,
                 },
                 constants: passes::TransportConstants {
                     receiver_nodes: g.tables.receiver_nodes as u32,
@@ -129,8 +136,8 @@ fn light_of_lamps_is_transported_or_split() {
         (0..g.elements.len() as u32).flat_map(|e| [0, 1, 2].map(|l| UVec2::new(e, l | 1 << 31))).collect();
     let flat_nodes: Vec<Vec3> = g.nodes.iter().flatten().copied().collect();
     let (threshold, far, ray_offset) = (0.05, 10.0f32, 1e-4f32);
-    let way =
-        Way { threshold, bent_light: BENT_LIGHT, rays_per_node: 1, functions: FUNCTIONS, by: Blockers::Triangles };
+    let by = Blockers::Triangles;
+    let way = Way { threshold, bent_light: BENT_LIGHT, rays_per_node: 1, wider: 1.0, functions: FUNCTIONS, by };
     let of = |pair: &UVec2| {
         let (e, l) = (pair.x as usize, (pair.y & !(1 << 31)) as usize);
         let reach = [f64::from(far), f64::from(ray_offset)];

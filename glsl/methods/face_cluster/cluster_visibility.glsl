@@ -8,8 +8,8 @@ layout(set = 0, binding = 18, scalar) readonly buffer Instances { ClusterInstanc
 layout(set = 0, binding = 19, scalar) readonly buffer Faces { uint tree_faces[]; };
 layout(set = 0, binding = 20, scalar) readonly buffer Positions { vec3 positions[]; };
 
-bool overlaps(uint first, uint count, uint other, uint other_count) { return first < other + other_count && other < first + count; }
-bool contains(uint first, uint count, uint other, uint other_count) { return other >= first && other + other_count <= first + count; }
+// Of ranges of places, which are nested or apart; one without places is in none.
+bool contains(uint first, uint count, uint other, uint other_count) { return other_count > 0 && other >= first && other + other_count <= first + count; }
 
 // Share of area that the cluster's faces cover of its box, seen along a unit direction; both sides of a face block.
 float opacity(FaceCluster c, vec3 d)
@@ -59,7 +59,7 @@ float free_share(vec3 x, vec3 y, float width)
                 continue;
             }
             // What holds the receiver or the shooter is looked into; so is what casts a shadow wider than nodes see.
-            bool holds = overlaps(passed_places.x, passed_places.y, first, count) || overlaps(passed_places.z, passed_places.w, first, count);
+            bool holds = contains(first, count, passed_places.x, passed_places.y) || contains(first, count, passed_places.z, passed_places.w);
             float shadow = 2.0 * length(c.half_extent) * inst.scale / max(1.0 - 0.5 * (enter + leave), 1e-3);
             bool is_leaf = skip == node + 1;
             if (!is_leaf && (holds || shadow > width)) {

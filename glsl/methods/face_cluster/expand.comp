@@ -18,11 +18,11 @@ void main()
     uint i = linear_index();
     if (i >= counters[0].taken) return;
     if (i == 0) pool[0].made_count = pool[0].element_count;
-    uint decision = decisions[i];
+    uint decision = decisions[i] & ~IN_SHADOW, shadow = decisions[i] & IN_SHADOW;
     if (decision == PAIR_IS_DONE) return;
 
     uvec2 pair = taken_pairs[i];
-    uint first = elements[decision == SPLIT_SHOOTER ? pair.y : pair.x].children;
+    uint shooter = pair.y & ~IN_SHADOW, first = elements[decision == SPLIT_SHOOTER ? shooter : pair.x].children;
     // Without children only where the pool is full: decided again when there is room.
     if (decision == PAIR_WAITS || first == NO_FACE_ELEMENT) {
         pair_stack[atomicAdd(counters[0].top, 1)] = pair;
@@ -32,7 +32,7 @@ void main()
     uint slot = atomicAdd(counters[0].top, count);
     for (uint k = 0; k < count; ++k) {
         uvec2 child = decision == SPLIT_BOTH ? first + uvec2(k & 1u, k >> 1)
-            : decision == SPLIT_RECEIVER ? uvec2(first + k, pair.y) : uvec2(pair.x, first + k);
+            : decision == SPLIT_RECEIVER ? uvec2(first + k, shooter | shadow) : uvec2(pair.x, (first + k) | shadow);
         pair_stack[slot + k] = child;
     }
 }

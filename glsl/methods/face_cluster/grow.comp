@@ -18,11 +18,11 @@ void main()
 {
     uint i = linear_index();
     if (i >= counters[0].taken) return;
-    uint decision = decisions[i];
+    uint decision = decisions[i] & ~IN_SHADOW;
     if (decision == PAIR_IS_DONE || decision == PAIR_WAITS) return;
 
     // Whoever is first claims them; other kernels read the place only after this one.
-    uint index = decision == SPLIT_SHOOTER ? taken_pairs[i].y : taken_pairs[i].x;
+    uint index = decision == SPLIT_SHOOTER ? taken_pairs[i].y & ~IN_SHADOW : taken_pairs[i].x;
     if (atomicCompSwap(elements[index].children, NO_FACE_ELEMENT, NO_FACE_ELEMENT - 1) != NO_FACE_ELEMENT) return;
     uint first = atomicAdd(pool[0].element_count, 2);
     if (first + 2 > params.capacity) {

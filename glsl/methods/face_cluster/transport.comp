@@ -19,15 +19,13 @@ layout(push_constant, scalar) uniform Params {
     float bent_light;   // W/m2, that a bent receiver may get as a whole
     float units;        // per W/m2
     uint rays_per_node;
+    float wider;        // where light is blocked: times the receiver's area that a shooter may have before it is split first
 } params;
 
 // Nearer to an element than half its size, its nodes do not tell how large it looks: the most of the hemisphere that it may
 // fill, and 0 farther off.
-float nearness(FaceElement e, vec3 x)
+float nearness(FaceElement e, float squared)
 {
-    vec3 d = x - e.center;
-    vec3 off = max(abs(vec3(dot(d, e.axis_x), dot(d, e.axis_y), dot(d, e.axis_z))) - e.half_extent, vec3(0.0));
-    float squared = max(dot(off, off), 1e-20);
     return squared < 0.25 * dot(e.half_extent, e.half_extent) ? min(1.0, e.area / (PI * squared)) : 0.0;
 }
 
@@ -41,7 +39,7 @@ void main()
         decisions[i] = PAIR_WAITS;
         return;
     }
-    uint receiver = taken_pairs[i].x, shooter = taken_pairs[i].y;
+    uint receiver = taken_pairs[i].x, shooter = taken_pairs[i].y & ~IN_SHADOW, shadow = taken_pairs[i].y & IN_SHADOW;
     FaceElement a = elements[receiver], b = elements[shooter];
     decisions[i] = PAIR_IS_DONE;
     float brightest = most(unshot[shooter * RADIOSITY_FUNCTIONS]);
@@ -86,12 +84,15 @@ void main()
         corners = vec3[3](positions[v.x], positions[v.y], positions[v.z]);
     }
     // Differs from [Gobbetti2003]: bounds between nodes alone miss what touches, or lies close above.
-    float near_power = brightest * b.area * nearness(a, b.center);
+    float near_power = brightest * b.area * nearness(a, squared_distance(a, b.center));
+    bool is_far = true;
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec3 x = receiver_node(receiver, r);
         at_nodes[r] = mat3(0.0);
         least[r] = 3e38;
-        greatest[r] = is_face ? near_power : max(near_power, brightest * a.area * nearness(b, x));
+        float off = squared_distance(b, x);
+        greatest[r] = is_face ? near_power : max(near_power, brightest * a.area * nearness(b, off));
+        is_far = is_far && off > 4.0 * dot(b.half_extent, b.half_extent);
         float sum = 0.0;
         bool sends = false;
         [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
@@ -122,14 +123,15 @@ void main()
     // that is too much light, faces must be met apart, small as they are.
     bool splits_a = is_bent(a) && can_split(a), splits_b = is_bent(b) && can_split(b);
     if ((splits_a || splits_b) && greatest_of_all > params.bent_light * a.area) {
-        decisions[i] = splits_a ? SPLIT_RECEIVER : SPLIT_SHOOTER;
+        decisions[i] = (splits_a ? SPLIT_RECEIVER : SPLIT_SHOOTER) | shadow;
         return;
     }
     // So little that even an error of all of it does not matter needs no more than one ray.
     bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
 
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
-    uint split = can_split(a) && (a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
+    float wider = is_far && shadow != 0 ? params.wider : 1.0;
+    uint split = can_split(a) && (wider * a.area >= b.area || !can_split(b)) ? SPLIT_RECEIVER : SPLIT_SHOOTER;
     bool may_split = can_split(a) || can_split(b);
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
     float free[RULE_NODES], shares[RULE_NODES];
@@ -140,7 +142,7 @@ void main()
         if (measures || is_small) {
             // Where both kinds of rays differ by too much light, neither is trusted.
             if (measures && may_split && a.most_albedo * abs(mean - seen) * strongest_at > params.threshold) {
-                decisions[i] = split;
+                decisions[i] = split | IN_SHADOW;
                 return;
             }
             if (mean <= 0.0) return;
@@ -151,7 +153,7 @@ void main()
         if (mean <= 0.0) {
             // What few rays miss is not dark: where that is too much to lose, it is looked for in the halves.
             if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) {
-                decisions[i] = split;
+                decisions[i] = split | IN_SHADOW;
                 return;
             }
         }
@@ -184,7 +186,7 @@ void main()
             error = max(error, max(said - least[r], greatest[r] - said));
         }
         if (a.most_albedo * error > params.threshold) {
-            decisions[i] = split;
+            decisions[i] = split | (seen < 0.999 ? IN_SHADOW : shadow);
             return;
         }
     }

@@ -30,7 +30,8 @@
 //! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
 //! is too small to matter, since one normal would leave half of them dark; what is near a large one is bounded by what that
 //! may fill of the hemisphere, since its nodes alone say too little; rays decide whether a pair is split and others measure
-//! what is let pass, one a node unless told otherwise, drawn by what would pass along them;
+//! what is let pass, one a node unless told otherwise, drawn by what would pass along them; the larger of
+//! both is split, but where an emitter's light is blocked the receiver, until it is a quarter as wide;
 //! transfers are made with the projected area expected between its bounds, not the lower bound, and what faces get beyond
 //! their vector area lies along the mean normal; (1 - F_ii) is not applied to what is reflected: F_ii of it is shot at
 //! the cluster itself, F_ii being what its nodes see of each other, below the bound; while light is shot, inner elements have room for

@@ -14,6 +14,10 @@ use std::time::Instant;
 const MOST_UNITS: f32 = (1 << 26) as f32;
 /// How far rays to lights start off their surface, as a share of the scene's diagonal.
 const RAY_OFFSET: f32 = 1e-5;
+/// Where some of its light is blocked, times a receiver's area that an emitter may have before it is split first: four times
+/// as wide. A shadow's border is found by splitting receivers: each piece of an emitter is soon too weak for a shadow to
+/// matter to it, and all together lose it. What was reflected is not even over a shooter: there it is 1.
+const WIDER_EMITTERS: f32 = 16.0;
 
 /// Metres.
 pub(super) fn ray_offset(stage: &Stage<'_>) -> f32 {
@@ -187,8 +191,9 @@ impl FaceClusters {
                 alpha_test,
                 clusters_block,
             };
-            let params =
-                passes::TransportParams { threshold, bent_light, units, rays_per_node: self.settings.rays_per_node };
+            let wider = if matches!(pass.shooters, Shooters::Emission) { WIDER_EMITTERS } else { 1.0 };
+            let rays_per_node = self.settings.rays_per_node;
+            let params = passes::TransportParams { threshold, bent_light, units, rays_per_node, wider };
             recorder.dispatch_indirect(&deciding!(Transport, unshot: &s.unshot, params, constants), &queue.groups);
         }
     }
