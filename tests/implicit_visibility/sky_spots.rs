@@ -73,7 +73,8 @@ fn bright_spots_are_hidden_by_the_surfaces_of_winners() {
         assert!(is_covered || (found - expected).length() < 1e-4 * expected.length() + 1e-4, "{found} for {expected}");
     }
     println!("{} spots: {visible} visible, {hidden} hidden, {differing} differ", spots.len());
-    assert!(differing * 500 < visible + hidden && visible > 1000 && hidden > 300);
+    // What the bins name is searched as a whole: near the rims of the box it is not all below the nodes they name.
+    assert!(differing * 2000 < visible + hidden && visible > 1000 && hidden > 300);
 }
 
 /// Shadows of a sun are those of rays, the more so the more bins there are, and far better than through the bins.
