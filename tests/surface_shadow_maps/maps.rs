@@ -1,9 +1,11 @@
 //! Maps: every compressed answer is the uncompressed one, on the host and on the device; ratios; the cache.
 
+use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, builtin_scene, options};
 use glam::Vec3;
 use linklight::gpu::shaders::types::SurfaceMapQuery;
+use linklight::scene::Material;
 use linklight::scene::environment::Environment;
 use linklight::stages::surface_maps::{
     Interval, MapFilter, MapOptions, MapUntil, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed,
@@ -235,32 +237,26 @@ fn small_charts_compress_better_by_sight() {
 #[test]
 fn what_lies_below_a_map_is_never_asked() {
     let context = TestContext::new();
-    let fixture = Fixture::new(&context, builtin_scene("furnace"), &Environment::default());
+    let floor = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
+    let wall = parallelogram(Vec3::new(2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::Y * 2.0, 1, 0);
+    let material = Material { double_sided: false, ..lambert(Vec3::splat(0.7)) };
+    let fixture = Fixture::new(&context, scene(vec![material], vec![floor, wall], &[]), &Environment::default());
     let atlas = fixture.atlas(32);
     let input = fixture.map_input(&atlas, None);
     let maps = SurfaceMaps::new(&context, input, options(16, Sequence::Spiral), &Unwatched).unwrap();
-    let [low, high] = fixture.bounds;
-    let middle = 0.5 * (low + high);
-    let floor = (0..atlas.texels.len()).filter(|&texel| atlas.texels[texel].normal.y > 0.9);
-    let off = |texel: &usize| (atlas.texels[*texel].position - middle).with_y(0.0).length();
-    let central = floor.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
-    let foot = low.y + 0.004 * (high.y - low.y);
-    let queries: Vec<SurfaceMapQuery> =
-        [(low.x, Vec3::X), (high.x, Vec3::NEG_X), (low.z, Vec3::Z), (high.z, Vec3::NEG_Z)]
-            .into_iter()
-            .map(|(at, normal)| {
-                let point = if normal.x != 0.0 { middle.with_x(at) } else { middle.with_z(at) };
-                SurfaceMapQuery { point: point.with_y(foot), normal, place: maps.places[central] }
-            })
-            .collect();
+    let (point, normal) = (Vec3::new(2.0, 0.01, 0.0), Vec3::NEG_X);
+    let floor = atlas.texels.iter().zip(&maps.places).filter(|(texel, _)| texel.normal.y > 0.9);
+    let central = floor.filter(|(texel, _)| texel.position.length() < 1.0);
+    let queries: Vec<SurfaceMapQuery> = central.map(|(_, &place)| SurfaceMapQuery { point, normal, place }).collect();
     let buffer = context.upload("test/queries", &queries).unwrap();
     let visibility = context.buffer("test/visibility", queries.len()).unwrap();
     let mut recorder = context.recorder("test").unwrap();
     maps.query(&mut recorder, &buffer, &visibility, queries.len(), MapFilter::Four);
     recorder.submit().unwrap();
     let seen: Vec<f32> = context.download(&visibility).unwrap();
-    println!("{seen:?}");
-    assert!(seen.iter().all(|&seen| seen > 0.999), "{seen:?}");
+    let hidden = seen.iter().filter(|&&seen| seen < 0.999).count();
+    println!("{hidden} of {} are hidden", seen.len());
+    assert!(seen.len() > 20 && hidden == 0, "{hidden}");
 }
 
 /// Wants no more work after so many steps.
