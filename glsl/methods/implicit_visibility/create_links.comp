@@ -40,7 +40,7 @@ void main()
     uint slot = gl_WorkGroupID.x + gl_WorkGroupID.y * gl_NumWorkGroups.x;
     if (slot >= params.group_count) return;
     ReceiverGroup group = receiver_groups[params.first_group + slot];
-    uint first = (KINDS * slot + KIND) * params.capacity, count = group_walks[slot].held[KIND];
+    uint first = (KINDS * slot + KIND) * params.capacity, count = min(group_walks[slot].held[KIND], params.capacity);
     uint k = gl_LocalInvocationID.x, proposed = 0;
     if (k >= count) return;
     do {
