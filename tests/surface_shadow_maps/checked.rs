@@ -8,6 +8,7 @@ use linklight::display::final_gather::{self, Visibility};
 use linklight::methods::surface_shadow_maps::{Settings, SurfaceShadowMaps, TexelVisibility};
 use linklight::scene::environment::Environment;
 use linklight::scene::{LightKind, Material};
+use linklight::stages::surface_maps::Sequence;
 
 /// Maps so coarse that they err much, one for texels up to `map_sharing` texels apart.
 fn prepared(context: &TestContext, name: &str, bounces: u32, map_sharing: f32) -> (Fixture, SurfaceShadowMaps) {
@@ -69,8 +70,9 @@ fn what_lies_close_behind_a_wall_stays_dark() {
     ];
     let materials = vec![lambert(Vec3::splat(0.7)), lamp];
     let fixture = Fixture::new(&context, scene(materials, primitives, &[]), &Environment::default());
-    let lit = |map_stretch: f32, visibility, gather_visibility| {
-        let settings = Settings { atlas_resolution: 48, map_resolution: 16, map_stretch, visibility, ..no_cache() };
+    let lit_by = |sequence, map_stretch: f32, visibility, gather_visibility| {
+        let settings =
+            Settings { atlas_resolution: 48, map_resolution: 16, map_stretch, visibility, sequence, ..no_cache() };
         let method = fixture.prepare(&context, settings);
         fixture.solve(&context, &method, 0);
         let settings =
@@ -83,6 +85,7 @@ fn what_lies_close_behind_a_wall_stays_dark() {
         });
         (shown, sides)
     };
+    let lit = |map_stretch, visibility, gather| lit_by(Sequence::Spiral, map_stretch, visibility, gather);
     let (rays, [lit_by_rays, dark_by_rays]) = lit(1.0, TexelVisibility::Rays, Visibility::Rays);
     let leak = |shown: &Shown| {
         let dark = shown.direct.iter().zip(&rays.direct).filter(|(_, rays)| **rays == Vec3::ZERO);
@@ -91,13 +94,17 @@ fn what_lies_close_behind_a_wall_stays_dark() {
     let (alone, [_, dark_alone]) = lit(0.0, TexelVisibility::Maps, Visibility::Maps);
     let (maps, [lit_by_maps, dark_by_maps]) = lit(1.0, TexelVisibility::Maps, Visibility::Maps);
     let (checked, _) = lit(1.0, TexelVisibility::Maps, Visibility::Checked);
+    let (by_sight, _) = lit_by(Sequence::Sight, 1.0, TexelVisibility::Maps, Visibility::Maps);
     println!("texels behind the wall: rays {dark_by_rays}, maps alone {dark_alone}, with short rays {dark_by_maps} W");
     println!("before it: rays {lit_by_rays}, maps {lit_by_maps} W");
-    println!("picture: maps alone {}, with short rays {}, checked {}", leak(&alone), leak(&maps), leak(&checked));
+    let [alone, short, checked, by_sight] = [&alone, &maps, &checked, &by_sight].map(leak);
+    println!("picture: maps alone {alone}, with short rays {short} (in order of sight {by_sight}), checked {checked}");
     // Texels across the wall's foot are lit on one side.
     assert!(dark_alone > 0.1 + 10.0 * dark_by_rays && dark_by_maps - dark_by_rays < 0.06 * dark_alone);
     assert!((lit_by_maps / lit_by_rays - 1.0).abs() < 0.02);
-    assert!(leak(&alone) > 0.1 && leak(&maps) < 0.08 * leak(&alone) && leak(&checked) < 0.02 * leak(&alone));
+    assert!(alone > 0.1 && short < 0.08 * alone && checked < 0.02 * alone);
+    // Depths that hold for more maps.
+    assert!(by_sight < 0.25 * alone);
     assert!(maps.report.mean_rays < rays.report.mean_rays);
 }
 

@@ -84,7 +84,7 @@ crate::settings! {
         /// Pixels a side of a depth cube map's face.
         map_resolution: u32 = 32, range 4..=256, unit "pixels", paper "32 or 64";
         /// How the texels are walked when maps are compressed.
-        sequence: Sequence = Sequence::Sight, paper "spiral is best";
+        sequence: Sequence = Sequence::Spiral, paper "spiral is best";
         /// How far depths keep from the surfaces they tell apart.
         map_bias: f32 = 0.05, range 0.0..=16.0, unit "widths of a pixel", paper "a depth bias, not given";
         /// How far behind the first surface a depth of a map may be: what lets it hold for longer.

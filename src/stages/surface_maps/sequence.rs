@@ -15,7 +15,8 @@ crate::choice! {
         ZigZag = "zig-zag",
         /// Along the border of each chart and inwards, stepping back when stuck
         Spiral = "spiral",
-        /// To the map close by that is most alike, as small maps made before tell; charts or not
+        /// To the map close by that is most alike, as small maps made before tell; charts or not. Smaller, but a depth that
+        /// holds for more maps stands less well for each: more light comes by behind thin things
         Sight = "sight",
     }
 }
