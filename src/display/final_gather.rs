@@ -72,7 +72,7 @@ crate::settings! {
         gather_map_reach: f32 = 4.0, range 0.0..=1000.0, unit "radii", paper "not done";
         /// What maps see is looked over by rays within so many widths of their pixels of the surface that sees: closer than
         /// that they cannot tell what lies before an edge from what lies behind it. 0 asks maps alone.
-        gather_map_stretch: f32 = 1.0, range 0.0..=100.0, unit "pixels of a map", paper "not done";
+        gather_map_stretch: f32 = 0.0, range 0.0..=100.0, unit "pixels of a map", paper "not done";
         /// Draw leaves, and points on them, by chance and anew in every sample.
         gather_jitter: bool = true, paper "for glossy surfaces";
         /// Take senders for at least so many of their radii away; 0 measures near ones exactly.
