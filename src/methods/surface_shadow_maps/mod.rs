@@ -26,8 +26,8 @@
 //! that nothing is clamped; leaves of a node are drawn by chance, so that the error of a cut is noise without a mean; the
 //! direct light of emissive texels comes by the same walk; texels receive at points drawn all over their surface, since
 //! those of small charts are large; where a map sees, a ray looks over the last stretch before the receiver, where its pixels
-//! are too wide to tell what lies before an edge from what lies behind it ([`Settings::map_stretch`]); maps are ordered by
-//! what they see; texels that stand close together may share a map ([`Settings::map_sharing`]).
+//! are too wide to tell what lies before an edge from what lies behind it ([`Settings::map_stretch`]); maps may be
+//! ordered by what they see ([`Settings::sequence`]); texels that stand close together may share a map ([`Settings::map_sharing`]).
 //!
 //! [Ritschel2008]: crate::methods::PAPERS
 
