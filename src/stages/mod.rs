@@ -25,6 +25,7 @@ pub mod scan;
 pub mod sender_tree;
 pub mod shiny_texels;
 pub mod splats;
+pub mod stand_ins;
 pub mod surface_maps;
 pub mod texels;
 pub mod trace;

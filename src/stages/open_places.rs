@@ -56,7 +56,7 @@ impl AtRest<'_> {
     }
 
     /// Just beside its vertex.
-    fn stand(&self, topology: &ElementTopology, entry: u32) -> (Vec3, Vec3) {
+    pub fn stand(&self, topology: &ElementTopology, entry: u32) -> (Vec3, Vec3) {
         let vertex = entry & !BACK_SIDE;
         let (own, around) = (self.positions[vertex as usize], topology.incident.row(vertex));
         let across: Vec3 = around.iter().map(|&triangle| self.across(triangle, entry)).sum();
@@ -94,6 +94,22 @@ fn middles_of_parts() -> impl Iterator<Item = Vec2> {
     cells.flat_map(move |(x, y)| upright(x, y).into_iter().chain(turned(x, y))).map(|at| at / SIDE as f32)
 }
 
+/// The elements that stand inside of other things, in order.
+pub fn hidden(
+    context: &Context,
+    at_rest: &AtRest<'_>,
+    topology: &ElementTopology,
+    watch: &dyn Watch,
+) -> Result<Vec<usize>, HiddenPartsError> {
+    if at_rest.positions.iter().any(|position| !position.is_finite()) {
+        return Ok(Vec::new());
+    }
+    let (points, normals): (Vec<Vec3>, Vec<Vec3>) =
+        topology.vertices.iter().map(|&entry| at_rest.stand(topology, entry)).unzip();
+    let hits = hidden_parts::back_hits(context, &at_rest.tracer, (&points, &normals), at_rest.ray_offset, watch)?;
+    Ok((0..hits.len()).filter(|&element| hits[element] >= HIDDEN_FROM).collect())
+}
+
 /// Where each element looks from; [`AT_ITS_VERTEX`] for most.
 pub fn find(
     context: &Context,
@@ -102,17 +118,10 @@ pub fn find(
     watch: &dyn Watch,
 ) -> Result<Vec<OpenPlace>, HiddenPartsError> {
     let mut places = vec![AT_ITS_VERTEX; topology.vertices.len()];
-    if at_rest.positions.iter().any(|position| !position.is_finite()) {
-        return Ok(places);
-    }
     let back_hits = |points: &[Vec3], normals: &[Vec3]| {
         hidden_parts::back_hits(context, &at_rest.tracer, (points, normals), at_rest.ray_offset, watch)
     };
-    let (points, normals): (Vec<Vec3>, Vec<Vec3>) =
-        topology.vertices.iter().map(|&entry| at_rest.stand(topology, entry)).unzip();
-    let hits = back_hits(&points, &normals)?;
-    let hidden: Vec<usize> = (0..places.len()).filter(|&element| hits[element] >= HIDDEN_FROM).collect();
-    for elements in hidden.chunks(BATCH) {
+    for elements in hidden(context, at_rest, topology, watch)?.chunks(BATCH) {
         let rows: Vec<Vec<Candidate>> =
             elements.iter().map(|&element| at_rest.candidates(topology, topology.vertices[element])).collect();
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = rows.iter().flatten().map(|c| (c.point, c.normal)).unzip();

@@ -2,9 +2,9 @@
 
 use crate::common::TestContext;
 use crate::common::lobe::specular_albedo;
-use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::common::scenes::{lambert, light, one_sided_box, parallelogram, scene};
 use crate::fixture::{Fixture, builtin_scene};
-use crate::support::{prepare, settings, solve};
+use crate::support::{Solution, prepare, settings, solve};
 use glam::{DVec3, Vec3, Vec4};
 use linklight::methods::antiradiance::{AntiradianceError, Scheme, Settings};
 use linklight::scene::environment::{Environment, EnvironmentMap};
@@ -13,6 +13,7 @@ use linklight::scene::shapes::Shape;
 use linklight::scene::{LightKind, Material, Primitive};
 use linklight::stages::emitters::EmitterChoice;
 use linklight::stages::work::Unwatched;
+use std::collections::HashMap;
 use std::f32::consts::PI;
 
 fn one_sided(albedo: f32) -> Material {
@@ -302,4 +303,39 @@ fn a_glossy_furnace_neither_makes_nor_loses_light() {
         ratio(2)
     );
     assert!((0..3).all(|k| (ratio(k) / expected - 1.0).abs() < 0.03), "{bounces:?}, expected {expected}");
+}
+
+/// Corners of a wall behind its skirting show what arrives above it, and send nothing.
+#[test]
+fn corners_inside_of_boards_show_the_light_beside_them() {
+    let context = TestContext::new();
+    let (low, high) = (Vec3::new(-0.1, -0.02, -0.04), Vec3::new(1.1, 0.07, 0.03));
+    let mut parts = vec![parallelogram(Vec3::ZERO, Vec3::X, Vec3::Y * 0.6, 12, 0)];
+    parts.extend(one_sided_box(low, high, 12));
+    parts.push(parallelogram(low, Vec3::X * (high.x - low.x), Vec3::Z * (high.z - low.z), 12, 0));
+    let lamp = light(LightKind::Point, 1.0);
+    let world = scene(vec![one_sided(0.5)], parts, &[(lamp, Vec3::new(0.5, 0.5, 1.0), Vec3::NEG_Z)]);
+    let fixture = Fixture::posed(&context, world, None, Environment::Constant(Vec3::ONE), Pose::rest);
+    for smoothing in [false, true] {
+        let mut method = prepare(&context, &fixture, Settings { smoothing, ..settings(128) });
+        let Solution { direct, indirect } = solve(&context, &mut method, &fixture, 1);
+        let punctual = context.download(method.punctual_irradiance()).unwrap();
+        let radiosity = context.download(&method.tables().radiosity).unwrap();
+        let sent: HashMap<u32, f32> = method
+            .hierarchy()
+            .plan
+            .leaves
+            .iter()
+            .map(|leaf| leaf.element)
+            .zip(radiosity.chunks(2).map(|sides| sides[0].x))
+            .collect();
+        for (hidden, open) in (0..26).map(|element| (element, 26 + element % 13)) {
+            // Of columns beside each other the own is the nearest.
+            for light in [&direct, &punctual, &indirect] {
+                assert_eq!(light[hidden], light[open], "corner {hidden}");
+            }
+            let [of_hidden, of_open] = [hidden, open].map(|element| sent[&(element as u32)]);
+            assert!(of_hidden < 0.5 * of_open, "corner {hidden} sends {of_hidden}, one in the open {of_open}");
+        }
+    }
 }

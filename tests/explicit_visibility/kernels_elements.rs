@@ -3,7 +3,7 @@
 use crate::common::{Random, TestContext};
 use crate::meshes::{COUNTS, Mesh, assert_close, points, rows, unit};
 use crate::twins;
-use glam::{Vec2, Vec3};
+use glam::{UVec2, Vec2, Vec3};
 use linklight::gpu::shaders::elements as passes;
 use linklight::gpu::shaders::methods::explicit_visibility as method_passes;
 use linklight::gpu::shaders::types::{OpenPlace, Ray};
@@ -169,5 +169,17 @@ fn passes_over_neighbours_agree_with_their_twins() {
         twins::elements::fill_unresolved(&outcomes, &ring, &normals, &mut filled, 256);
         assert_close("fill_unresolved", &context.download(&device).unwrap(), &filled, 1e-6, 1e-5);
         assert!(count < 60 || filled != irradiance, "some elements are unresolved");
+
+        // Of two elements in the open each, those before them.
+        let pairs: Vec<UVec2> = (0..count / 3).map(|k| UVec2::new(3 * k, 3 * k + 1 + random.below(2))).collect();
+        let values = context.upload("test/values", &irradiance).unwrap();
+        let mut recorder = context.recorder("test").unwrap();
+        let pairs_buffer = context.upload("test/pairs", &pairs).unwrap();
+        let params = passes::TakeOverParams { pair_count: pairs.len() as u32 };
+        recorder.dispatch(&passes::TakeOver { pairs: &pairs_buffer, values: &values, params }, pairs.len() as u32);
+        recorder.submit().unwrap();
+        let mut taken = irradiance.clone();
+        twins::elements::take_over(&pairs, &mut taken);
+        assert_eq!(context.download(&values).unwrap(), taken, "take_over");
     }
 }

@@ -104,8 +104,9 @@ impl Antiradiance {
         Ok(takes.iter().map(of_element).collect())
     }
 
-    /// The leaves that an element takes light from, as `to_elements` does, and its shares of them.
+    /// The leaves that an element takes light from, as `to_elements` and `take_over` do, and its shares of them.
     fn takes(&self, element: u32) -> Vec<(Side, f32)> {
+        let element = self.stand_ins.of(element);
         let plan = &self.hierarchy.plan;
         let Some(&entry) = self.elements.topology.vertices.get(element as usize) else { return Vec::new() };
         let vertex = (entry & !BACK_SIDE) as usize;

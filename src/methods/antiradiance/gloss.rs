@@ -256,6 +256,8 @@ impl Antiradiance {
             },
         };
         recorder.dispatch(&pass, gloss.count);
+        self.stand_ins.take_over(recorder, shown);
+        self.stand_ins.take_over(recorder, &self.state.shown_direct);
     }
 
     /// What [`Self::look`] left of direct and indirect light, W/m2 per element.

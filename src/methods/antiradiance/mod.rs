@@ -25,15 +25,17 @@
 //! factors over standing links:** surfaces that move within [`Settings::motion_margin`]. **With new links:** any motion
 //! ([`Antiradiance::follow`]).
 //!
-//! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the cosines
-//! and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat one by
-//! samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance may not fall
-//! far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes are nodes of their
-//! own; near senders are discs, never more than
-//! half of the sphere; links are made on the device, none between solids back to back; what a leaf receives along links of
-//! the nodes above is scaled to what an even light would bring to the leaf itself (selectable). A patch of a flat part is made of the cells of its vertices, one or many
-//! ([`Settings::leaves`]). Direct light of punctual lights and sampled emitters is that of shadow rays.
-//! Glossy leaves reflect their incident bins through their lobes, none narrower than a bin.
+//! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the
+//! cosines and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat
+//! one by samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance
+//! may not fall far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes
+//! are nodes of their own; near senders are discs, never more than half of the sphere; links are made on the device,
+//! none between solids back to back; what a leaf receives along links of the nodes above is scaled to what an even
+//! light would bring to the leaf itself (selectable). A patch of a flat part is made of the cells of its vertices, one
+//! or many ([`Settings::leaves`]). Direct light of punctual lights and sampled emitters is that of shadow rays.
+//! Elements inside of other things, dark by their neighbours' negative light, show what arrives at the nearest in the
+//! open (`stages::stand_ins`). Glossy leaves reflect their incident bins through their lobes, none narrower than a
+//! bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS
@@ -69,9 +71,11 @@ use crate::scene::surfaces::Surfaces;
 use crate::stages::direction_bins::DeviceBins;
 use crate::stages::elements::{ElementTopology, Elements};
 use crate::stages::emitters::Emitters;
+use crate::stages::hidden_parts::HiddenPartsError;
 use crate::stages::hierarchy::{Behind, Hierarchy, HierarchyPlan};
 use crate::stages::punctual;
 use crate::stages::splats::Splats;
+use crate::stages::stand_ins::StandIns;
 use crate::stages::work::{Interrupted, Watch};
 use crate::stages::world::World;
 use glam::Vec3;
@@ -85,6 +89,8 @@ pub enum AntiradianceError {
     Linking(#[from] LinkingError),
     #[error(transparent)]
     Interrupted(#[from] Interrupted),
+    #[error(transparent)]
+    HiddenParts(#[from] HiddenPartsError),
     #[error(
         "antiradiance: {what} of {nodes} nodes and {bins} bins needs {needed} bytes, {available} are available; lower \
          bins or --elements{}", if *.half { "" } else { ", or set half_tables=true" }
@@ -102,6 +108,7 @@ pub enum AntiradianceError {
 pub struct Antiradiance {
     settings: Settings,
     elements: Elements,
+    stand_ins: StandIns,
     emitters: Emitters,
     hierarchy: Hierarchy,
     splats: Splats,
@@ -158,6 +165,7 @@ impl Antiradiance {
     ) -> Result<Self, AntiradianceError> {
         let topology = ElementTopology::new(stage.scene, stage.geometry, stage.rest_positions);
         let elements = Elements::new(context, topology, stage.rest_positions, stage.world, settings.ray_offset)?;
+        let stand_ins = stage.stand_ins(context, &elements)?;
         let (choice, samples) = (settings.emitters, settings.emitter_samples);
         let emitters = Emitters::new(context, stage.geometry, stage.rest_positions, &elements, choice, samples)?;
 
@@ -168,7 +176,7 @@ impl Antiradiance {
             Backs::All => Behind::BlockAll,
             Backs::None => Behind::Pass,
         };
-        let moves = moving_parts(stage);
+        let moves = stage.moving_parts();
         let margin = |vertex: u32| {
             let part = stage.geometry.vertex_part[vertex as usize];
             if moves[part as usize] { settings.motion_margin } else { 0.0 }
@@ -182,8 +190,8 @@ impl Antiradiance {
         let (threshold, bin_count) = (settings.gloss_threshold, settings.bins.get());
         let gloss =
             Gloss::new(context, &hierarchy, &elements, stage.world, threshold, (bin_count, settings.half_tables))?;
-        let (half, undershoot) = (settings.half_tables, settings.undershoot);
-        let tables = Tables::new(context, &hierarchy, &bins, stage.environment, half, undershoot, gloss)?;
+        let (environment, half, undershoot) = (stage.environment, settings.half_tables, settings.undershoot);
+        let tables = Tables::new(context, &hierarchy, &bins, environment, half, undershoot, gloss)?;
         let mut recorder = context.recorder("antiradiance")?;
         tables.update_norms(&mut recorder, &hierarchy, &bins);
         tables.update_albedo(&mut recorder, &hierarchy, &elements);
@@ -202,6 +210,7 @@ impl Antiradiance {
             kept: None,
             settings,
             elements,
+            stand_ins,
             emitters,
             hierarchy,
             splats,
@@ -290,9 +299,11 @@ impl Antiradiance {
         let mut recorder = context.recorder("antiradiance")?;
         recorder.scope("to elements", |recorder| {
             self.to_elements(recorder, &self.tables.irradiance, &self.state.indirect);
+            self.stand_ins.take_over(recorder, &self.state.indirect);
             if self.settings.smoothing {
                 let feature_angle = self.settings.feature_angle.to_radians();
                 self.elements.smooth(recorder, feature_angle, &self.state.indirect, &self.state.smoothed);
+                self.stand_ins.take_over(recorder, &self.state.smoothed);
             }
         });
         Ok(recorder.submit()?)
@@ -307,6 +318,9 @@ impl Antiradiance {
         elements.add(recorder, &s.irradiance, &s.direct);
         elements.add(recorder, &s.punctual, &s.irradiance);
         self.reflect_direct(recorder, world);
+        // Last: hidden elements reflect nothing of it.
+        self.stand_ins.take_over(recorder, &s.punctual);
+        self.stand_ins.take_over(recorder, &s.direct);
     }
 
     /// The leaves' sources: what they emit along links, or what they reflect of all direct light.
@@ -464,30 +478,4 @@ fn patches(stage: &Stage<'_>, elements: &Elements, facets: &Facets, settings: &S
             Patches::of_squares(&vertices, positions, facets, settings.patch_side * (high - low).length())
         }
     }
-}
-
-/// Per part: whether an animation moves it.
-fn moving_parts(stage: &Stage<'_>) -> Vec<bool> {
-    let scene = stage.scene;
-    let mut moves = vec![false; scene.nodes.len()];
-    for channel in scene.clips.iter().flat_map(|clip| &clip.channels) {
-        if let Some(node) = moves.get_mut(channel.node as usize) {
-            *node = true;
-        }
-    }
-    let is_moved = |mut node: u32| {
-        // As many steps up as there are nodes, at most.
-        for _ in 0..moves.len() {
-            if moves[node as usize] {
-                return true;
-            }
-            match scene.nodes[node as usize].parent {
-                Some(parent) => node = parent,
-                None => break,
-            }
-        }
-        false
-    };
-    let parts = stage.geometry.parts.iter();
-    parts.map(|part| is_moved(part.node) || part.skin_offset.is_some()).collect()
 }

@@ -1,6 +1,6 @@
 //! Twins of glsl/elements/ but for light sources, and of the rays of an element.
 
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Mat3, UVec2, Vec2, Vec3};
 use linklight::gpu::shaders::types::{OpenPlace, Ray};
 use linklight::scene::adjacency::Rows;
 use linklight::stages::elements::BACK_SIDE;
@@ -115,6 +115,12 @@ pub fn fill_unresolved(outcomes: &[u32], ring: &Rows, normals: &[Vec3], irradian
         if !resolved.is_empty() {
             irradiance[element as usize] = resolved.iter().sum::<Vec3>() / resolved.len() as f32;
         }
+    }
+}
+
+pub fn take_over(pairs: &[UVec2], values: &mut [Vec3]) {
+    for pair in pairs {
+        values[pair.x as usize] = values[pair.y as usize];
     }
 }
 
