@@ -15,6 +15,7 @@ mod glossy_picture;
 mod holes;
 mod lobe_light;
 mod oracle;
+mod outlines;
 mod passes;
 mod physics;
 mod shadows;

@@ -33,12 +33,12 @@ layout(push_constant, scalar) uniform Params {
     uint is_start;          // 1: walks start here
 } params;
 
-// How much more a sender counts where it is bent: there an ellipse is no good outline.
-const float BENT = 1.0;
+// How much more a sender counts where it is bent: there a parallelogram is no good outline.
+const float BENT = 3.0;
 // How much more a receiver counts than a sender: links are received at its middle, and what its leaves see by them is off
 // by its own size, a quarter of a bin at most.
-const float PARALLAX = 16.0;
-// What flat ones are foreshortened to at most: their ellipses reach beyond them at their rims, and steep ones far.
+const float PARALLAX = 32.0;
+// What flat ones are foreshortened to at most: their outlines are off at their rims, and those of steep ones far.
 const float STEEPEST = 0.5;
 
 // What a sender shows of itself, m2: its disc foreshortened as its cone of normals allows.

@@ -22,7 +22,7 @@ struct Sender {
     vec3 centre;
     Extents extents;
     vec3 half_axes[2];  // or moments; see link_texels.glsl
-    vec3 vertex;
+    vec3 vertex;        // or what a node has there
     uint first_corner;
     uint corner_count;
     uint sides;
@@ -95,12 +95,13 @@ Meeting meet_leaf(vec3 to_vertex, vec3 direction)
     return nearest;
 }
 
-// On the ellipse's plane; `x` and `y` times `slope` tell where.
+// On the plane of a leaf's cell or of a node's parallelogram, or on an outline's ellipse; `x` and `y` by `slope` tell where.
 float meet_ellipse(SeenEllipse e, vec3 direction)
 {
     float slope = dot(e.of_plane, direction), x = dot(e.of_b, direction), y = dot(e.of_a, direction);
     float t = e.volume / slope;
-    if (KIND != OF_FLAT_LEAVES) return t > 0.0 && x * x + y * y <= slope * slope ? t : FAR;
+    if (KIND == OF_PLANES) return t > 0.0 && max(abs(x), abs(y)) <= IN_CORNERS * abs(slope) ? t : FAR;
+    if (KIND == OF_OUTLINES) return t > 0.0 && x * x + y * y <= slope * slope ? t : FAR;
     vec2 from_vertex = vec2(-x, y) / slope - sender.vertex.xy;
     uint is_in = 0;
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
@@ -149,6 +150,7 @@ void link(Receiver at, uint row, bool is_dropped)
     // Another leaf shows the back.
     if (KIND == OF_FLAT_LEAVES) is_dropped = is_dropped || (is_behind && (sender.sides & CELL_HAS_OTHER_SIDE) != 0);
     vec3 c = offset, to_vertex = sender.vertex - at.origin;
+    if (KIND == OF_PLANES) c += sender.vertex;
     if (IS_TURNED != 0) {
         c = turn_back(at.frame, c);
         axes = vec3[](turn_back(at.frame, axes[0]), turn_back(at.frame, axes[1]));

@@ -301,6 +301,8 @@ impl Linking {
             moments: &trees.moments,
             leaf_cells: &trees.leaf_cells,
             receivers: &self.receivers,
+            node_segments: &trees.node_segments,
+            segments: &trees.segments,
             sender_texels: self.sender_texels.buffer(),
             receiver_texels: self.receiver_texels.buffer(),
             params: passes::PackNodesParams { node_count, leaf_count },
