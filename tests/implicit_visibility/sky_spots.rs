@@ -77,7 +77,7 @@ fn bright_spots_are_hidden_by_the_surfaces_of_winners() {
     assert!(differing * 2000 < visible + hidden && visible > 1000 && hidden > 300);
 }
 
-/// Shadows of a sun are those of rays, the more so the more bins there are, and far better than through the bins.
+/// Shadows of a sun are those of rays, and far better than through the bins.
 #[test]
 fn a_sun_casts_the_shadow_that_rays_find() {
     let context = TestContext::new();
@@ -111,6 +111,6 @@ fn a_sun_casts_the_shadow_that_rays_find() {
         println!("N = {n}: {} spots, lost {:.2e}, leaked {:.2e}", spots.len(), lost / all, leaked / all);
         (lost / all, leaked / all)
     });
-    assert!(errors.iter().all(|&(lost, _)| lost < 1e-3), "{errors:?}");
-    assert!(errors[2].1 < 5e-3 && errors[2].1 <= errors[0].1, "{errors:?}");
+    // Of flat parts in rows the bins name all that hides, however few they are.
+    assert!(errors.iter().all(|&(lost, leaked)| lost < 1e-3 && leaked < 1e-4), "{errors:?}");
 }
