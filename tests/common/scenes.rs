@@ -67,9 +67,20 @@ pub fn strip_between_boards() -> Scene {
 }
 
 /// What the corners of that strip receive of an even sky of radiance 1, by what the boards leave of it at a height, W/m2.
-pub fn sky_on_the_strip(height: f32) -> f32 {
+fn sky_on_the_strip(height: f32) -> f32 {
     let leaves = |reach: f32, depth: f32| reach / reach.hypot(depth);
     0.5 * std::f32::consts::PI * (leaves(0.09 - height, 0.07) + leaves(height - 0.025, 0.025))
+}
+
+/// Holds what the four corners of that strip receive (W/m2) to what its open part does under an even sky of radiance 1.
+pub fn assert_as_in_the_open(direct: &[Vec3]) {
+    // Of all heights in the open, the least and the most that arrives.
+    let open: Vec<f32> = (30..=85).map(|height| sky_on_the_strip(height as f32 / 1000.0)).collect();
+    let [least, most] = [open.iter().copied().fold(f32::MAX, f32::min), open.iter().copied().fold(0.0, f32::max)];
+    for (corner, found) in direct.iter().take(4).enumerate() {
+        println!("corner {corner}: {found} of {least} to {most}");
+        assert!(found.x > 0.9 * least && found.x < 1.1 * most, "corner {corner}: {found}, {least} to {most} allowed");
+    }
 }
 
 /// One node per primitive, one per light (at `position`, shining along `direction`).

@@ -1,7 +1,7 @@
 //! Closed forms and conservation laws.
 
 use crate::common::TestContext;
-use crate::common::scenes::{lambert, light, parallelogram, scene, sky_on_the_strip, strip_between_boards};
+use crate::common::scenes::{assert_as_in_the_open, lambert, light, parallelogram, scene, strip_between_boards};
 use crate::fixture::{Fixture, builtin_scene, solve};
 use glam::Vec3;
 use linklight::methods::implicit_visibility::{Footprint, Frames, Settings, Transport};
@@ -114,12 +114,5 @@ fn corners_inside_of_boards_receive_what_arrives_in_the_open() {
     let sky = Environment::Constant(Vec3::ONE);
     let fixture = Fixture::posed(&context, strip_between_boards(), None, sky, Pose::rest);
     let method = fixture.linked(&context, Settings::default());
-    let direct = solve(&context, &method, &fixture.world, 0).direct;
-    // Of all heights in the open, the least and the most that arrives.
-    let open: Vec<f32> = (30..=85).map(|height| sky_on_the_strip(height as f32 / 1000.0)).collect();
-    let [least, most] = [open.iter().copied().fold(f32::MAX, f32::min), open.iter().copied().fold(0.0, f32::max)];
-    for (corner, found) in direct.iter().take(4).enumerate() {
-        println!("corner {corner}: {found} of {least} to {most}");
-        assert!(found.x > 0.9 * least && found.x < 1.1 * most, "corner {corner}: {found}, {least} to {most} allowed");
-    }
+    assert_as_in_the_open(&solve(&context, &method, &fixture.world, 0).direct);
 }
