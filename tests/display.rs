@@ -169,6 +169,32 @@ fn an_occluder_shades_exactly_what_it_hides() {
     }
 }
 
+/// A normal map raises nothing: behind a fin, the shadow on a floor with one begins at the fin.
+#[test]
+fn a_normal_map_lets_no_sun_through() {
+    let context = TestContext::new();
+    let mut base = floor(0.5, 20.0, 1);
+    // Leans by the arc cosine of 0.6, as far towards the sun as the floor itself.
+    let rgba = vec![128, 230, 204, 255];
+    base.images = vec![Image { name: "lean".into(), width: 1, height: 1, rgba, srgb: false }];
+    base.textures = vec![nearest_texture(0)];
+    let transform = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    base.materials[0].normal_texture = Some(TextureRef { texture: 0, uv_set: 0, transform });
+    let fin = parallelogram(Vec3::new(-0.5, 0.0, 2.0), Vec3::NEG_Z * 4.0, Vec3::Y, 1, 0);
+    base.nodes.push(Node { mesh: Some(base.meshes.len() as u32), ..Node::default() });
+    base.meshes.extend(scene(vec![], vec![fin], &[]).meshes);
+    let sunny = with_light(base, LightKind::Directional, 2.0, Vec3::Y, Vec3::new(1.0, -1.0, 0.0).normalize());
+    // All that is seen lies in the fin's shadow, which is a metre wide.
+    let shown = show(&context, &sunny, &view(Vec3::new(0.0, 3.0, 1e-3), Vec3::NEG_Z, 0.127), 1, 0.0, 0.0);
+    let lit = shown.direct.iter().filter(|direct| **direct != Vec3::ZERO).count();
+    println!("{lit} of {} pixels in shadow are lit", shown.direct.len());
+    assert!(shown.normal.iter().all(|normal| normal.y < 0.7), "the map leans: {}", shown.normal[0]);
+    assert_eq!(lit, 0);
+    // Beyond the shadow there is sun.
+    let shown = show(&context, &sunny, &view(Vec3::new(0.0, 9.0, 1e-3), Vec3::NEG_Z, 0.4), 1, 0.0, 0.0);
+    assert!(shown.direct.iter().any(|direct| direct.x > 0.1));
+}
+
 /// Half of the square is cut out by its texture, half stands: at x < 0. The sun throws its shadow 0.7 m aside, out from
 /// under it.
 #[test]

@@ -7,7 +7,7 @@
 
 // One thread per pixel: what every display stage starts from: background, emission, punctual light by shadow maps, and
 // what is seen there. The stage adds all other light.
-// reads the G-buffer, triangles, positions, lights, shadow maps, the environment
+// reads the G-buffer, triangles, positions, normals, lights, shadow maps, the environment
 // updates direct, indirect, albedo, normal, depth [pixel_count]   shared none
 layout(set = 0, binding = 8, scalar) readonly buffer Lights { Light lights[]; };
 layout(set = 0, binding = 9, scalar) readonly buffer ShadowLights { ShadowLight shadow_lights[]; };
@@ -20,6 +20,7 @@ layout(set = 0, binding = 15, scalar) buffer Indirect { vec3 indirect[]; };
 layout(set = 0, binding = 16, scalar) buffer AlbedoSum { vec3 albedo[]; };
 layout(set = 0, binding = 17, scalar) buffer NormalSum { vec3 normal[]; };
 layout(set = 0, binding = 18, scalar) buffer DepthSum { float depth[]; };
+layout(set = 0, binding = 19, scalar) readonly buffer Normals { vec3 normals[]; };
 // eye: position and 1, or the direction to an orthographic eye and 0; weight: of this sample of the pixel.
 layout(push_constant, scalar) uniform Params {
     mat4 clip_from_world;
@@ -44,8 +45,9 @@ vec3 shadow_ndc(ShadowView view, vec3 point)
 // of the surface's own plane there (projections keep planes plane), so no surface shadows itself, and nothing has to
 // be moved towards the light, which would leak through walls without thickness. A texel is free where the light sees
 // this very surface. Where it sees past the plane, the surface has ended: that counts as blocked where others are, or
-// sunlight outside would shine in along the edges of a room.
-float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 shading_normal, vec3 to_light, float distance_to_light)
+// sunlight outside would shine in along the edges of a room. `smooth_normal`: of the mesh, without normal maps, which raise no
+// triangle above another.
+float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 smooth_normal, vec3 to_light, float distance_to_light)
 {
     ShadowLight views = shadow_lights[light];
     if (views.count == 0) return 1.0;
@@ -69,7 +71,7 @@ float lit_share(uint light, vec3 point, vec3 surface_normal, vec3 shading_normal
     float step_depth = abs(shadow_ndc(view, point + texel * to_light).z - at.z);
     // Next to a triangle of a smooth mesh others rise above its plane, by about twice what the normals differ, two
     // texels away; a flat surface needs no more than the last digits of a depth.
-    float rise = 8.0 * distance(surface_normal, shading_normal) / max(dot(surface_normal, to_light), 0.1);
+    float rise = 8.0 * distance(surface_normal, smooth_normal) / max(dot(surface_normal, to_light), 0.1);
     slope = clamp(slope * texel_ndc, vec2(-30.0 * step_depth), vec2(30.0 * step_depth));
     float tolerance = (0.01 + rise) * step_depth + 0.002 * (abs(slope.x) + abs(slope.y));
 
@@ -121,13 +123,16 @@ void main()
     Surface s = seen.surface;
     vec3 direct_sum = params.is_unlit != 0 ? vec3(0.0) : s.emission;
     if (s.reflects && params.is_unlit == 0) {
+        uvec3 v = seen.vertices;
+        vec3 smooth_normal = normalize(mat3(normals[v.x], normals[v.y], normals[v.z]) * seen.weights);
+        if (seen.is_back) smooth_normal = -smooth_normal;
         for (uint light = 0; light < params.light_count; ++light) {
             vec3 to_light;
             float distance_to_light;
             vec3 arriving = light_irradiance(lights[light], seen.position, to_light, distance_to_light);
             float cosine = dot(s.normal, to_light);
             if (cosine <= 0.0 || dot(seen.geometric, to_light) <= 0.0 || arriving == vec3(0.0)) continue;
-            float lit = lit_share(light, seen.position, seen.geometric, s.normal, to_light, distance_to_light);
+            float lit = lit_share(light, seen.position, seen.geometric, smooth_normal, to_light, distance_to_light);
             if (lit > 0.0) direct_sum += brdf_value(s, seen.to_eye, to_light) * arriving * (cosine * lit);
         }
     }

@@ -86,6 +86,7 @@ pub fn shade(
         g_emission: g_buffer.sampled(&g_buffer.emission),
         triangles: &world.triangles,
         positions: &world.positions,
+        normals: &world.normals,
         lights: &world.lights,
         shadow_lights: &shadow_maps.lights,
         shadow_views: &shadow_maps.views,
