@@ -96,7 +96,7 @@ struct RigidPoint {
     vec3 normal;
     uint object;
     uint place;     // of its map
-    MapStand stand; // of that, at rest
+    vec3 from;      // where that stands, at rest
 };
 
 bool rigid_asks_rays(uint object, uint other) { return (rigid_object(object).asks_rays >> other & 1u) != 0; }
@@ -105,10 +105,10 @@ bool rigid_asks_rays(uint object, uint other) { return (rigid_object(object).ask
 float rigid_visibility(SurfaceMapFrame frame, RigidPoint sender, RigidPoint receiver)
 {
     RigidObject o = rigid_object(sender.object);
-    float told, free = surface_map_visibility(frame, sender.place, sender.stand, at_rest(o, receiver.position), direction_at_rest(o, receiver.normal), told);
+    float free = surface_map_view(frame, sender.place, sender.from, at_rest(o, receiver.position), direction_at_rest(o, receiver.normal)).seen;
     if (receiver.object != sender.object && free > 0.0) {
         o = rigid_object(receiver.object);
-        free *= surface_map_visibility(frame, receiver.place, receiver.stand, at_rest(o, sender.position), direction_at_rest(o, sender.normal), told);
+        free *= surface_map_view(frame, receiver.place, receiver.from, at_rest(o, sender.position), direction_at_rest(o, sender.normal)).seen;
     }
     vec4 shift = unit_interval(pcg4d(uvec4(floatBitsToUint(receiver.position), sender.place))) - 0.5;
     if (frame.filter_mode == 0) shift = vec4(0.0);
@@ -138,12 +138,15 @@ vec4 outside_shift(uint look_up)
 bool rigid_is_sure(SurfaceMapFrame frame, RigidPoint sender, RigidPoint receiver, out bool is_free)
 {
     RigidObject o = rigid_object(sender.object);
-    float told;
-    if (!surface_map_is_sure(frame, sender.place, sender.stand, at_rest(o, receiver.position), direction_at_rest(o, receiver.normal), is_free, told)) return false;
-    if (is_free && receiver.object != sender.object) {
+    frame = asking_four(frame);
+    MapView view = surface_map_view(frame, sender.place, sender.from, at_rest(o, receiver.position), direction_at_rest(o, receiver.normal));
+    if (!view_is_sure(view)) return false;
+    if (view.seen > 0.5 && receiver.object != sender.object) {
         o = rigid_object(receiver.object);
-        if (!surface_map_is_sure(frame, receiver.place, receiver.stand, at_rest(o, sender.position), direction_at_rest(o, sender.normal), is_free, told)) return false;
+        view = surface_map_view(frame, receiver.place, receiver.from, at_rest(o, sender.position), direction_at_rest(o, sender.normal));
+        if (!view_is_sure(view)) return false;
     }
+    is_free = view.seen > 0.5;
     uint count = rigid_word(RIGID_COUNT);
     for (uint k = 0; k < count && is_free; ++k) {
         if (k == sender.object || k == receiver.object) continue;

@@ -2,6 +2,9 @@
 #define LIB_SENDER_MAPS
 // By which maps a point of a sender's texel sees: that of the texel, and those of the texels beside it. Percentage-closer
 // filtering over senders.                                                                       [Ritschel2008 3.2.2]
+//
+// Bridge, beside those of lib/surface_map.glsl: where the map at a place stands, metres.
+//     vec3 map_origin(uint place)
 #include "lib/sender_tree.glsl"
 #include "lib/surface_map.glsl"
 
@@ -41,5 +44,19 @@ SenderPlaces sender_places(SurfaceMapFrame frame, LeafMaps maps, vec2 at, vec3 p
     if (frame.sender_filter == 2)
         return SenderPlaces(3, uvec3(place, beside_u, beside_v), vec3(1.0 - share.x - along_v, share.x, along_v));
     return SenderPlaces(1, uvec3(place), vec3(1.0, 0.0, 0.0));
+}
+
+vec3 map_origin(uint place);
+
+// What the maps of a leaf tell of a point that one of the leaf sends to.
+MapView leaf_view(SurfaceMapFrame frame, LeafMaps maps, vec2 at, vec3 point, vec3 normal)
+{
+    SenderPlaces asked = sender_places(frame, maps, at, point);
+    MapView all = MapView(0.0, 1.0);
+    for (uint k = 0; k < asked.count; ++k) {
+        MapView view = surface_map_view(frame, asked.place[k], map_origin(asked.place[k]), point, normal);
+        all = MapView(all.seen + asked.weight[k] * view.seen, min(all.told, view.told));
+    }
+    return all;
 }
 #endif

@@ -22,10 +22,10 @@ struct SurfaceMapFrame {
     float near_share;       // of a point's distance: what is closer before it than that does not count; a ray looks there
 };
 
-// Where a map stands.
-struct MapStand {
-    vec3 origin;            // metres
-    vec3 normal;            // unit: what lies below this plane the map leaves open
+// What a map tells of a point: the share of it that is seen, and the share of the way, from the map on, that this is true of.
+struct MapView {
+    float seen;
+    float told;
 };
 
 uint word_of(uvec4 texel, uint k) { return k < 2 ? (k == 0 ? texel.x : texel.y) : (k == 2 ? texel.z : texel.w); }
@@ -79,71 +79,30 @@ struct SurfaceMapSight {
     vec3 normal;
     float height;       // of the point's plane over the map, metres
     float distance_to;  // metres
-    float told;         // of the distance, what every pixel asked tells of; 0 where one is in doubt
 };
 
-// Whether the map at `place` sees the point's surface through a pixel. Depths are of the pixel's own ray: where that meets
+// What the map at `place` tells of the point's surface through a pixel. Depths are of the pixel's own ray: where that meets
 // the surface's plane is compared with what it met first, so that no slope needs a bias. A plane that the ray meets far
 // from the point, or never, tells nothing of the surface there: then the point's own distance counts.
 // Differs from [Ritschel2008]: they compare the point's distance, with a bias.
-float surface_pixel_seen(SurfaceMapFrame frame, inout SurfaceMapSight sight, uint place, uint pixel)
+MapView surface_pixel_view(SurfaceMapFrame frame, SurfaceMapSight sight, uint place, uint pixel)
 {
     float lean = dot(sight.normal, cube_pixel_direction(pixel, frame.resolution));
     float along = sight.height / (lean == 0.0 ? 1e-30 : lean);
     float width = FARTHEST_PLANE / float(frame.resolution) * sight.distance_to;
     if (!(abs(along - sight.distance_to) <= width)) along = sight.distance_to;
     float depth = float(surface_map_depth(frame, place, pixel)), near = along * (1.0 - frame.near_share);
-    // What only the share left out shows may as well be hidden farther off by what leans away from the pixel's ray.
     bool is_seen = min(near * frame.codes_per_metre, 65533.0) <= depth;
+    // What only the share left out shows may as well be hidden farther off by what leans away from the pixel's ray.
     bool is_doubtful = is_seen && min(along * frame.codes_per_metre, 65533.0) > depth;
-    sight.told = is_doubtful ? 0.0 : min(sight.told, near / sight.distance_to);
-    return is_seen ? 1.0 : 0.0;
+    return MapView(is_seen ? 1.0 : 0.0, is_doubtful ? 0.0 : min(near / sight.distance_to, 1.0 - frame.near_share));
 }
 
-// The pixel of a face, or the first above the map's plane along one side of the face where it looks below that: pixels there
-// were left open, any depth may stand in them, and a point of the plane itself is filtered over both.
-// Differs from [Ritschel2008]: there pixels below the plane answer too.
-uint pixel_above(SurfaceMapFrame frame, MapStand stand, uint face, uvec2 pixel)
+// What the map at `place`, which stands at `origin`, tells of a point; unfiltered, all of it is seen or nothing.
+MapView surface_map_view(SurfaceMapFrame frame, uint place, vec3 origin, vec3 point, vec3 normal)
 {
-    uint index = cube_pixel_index(face, pixel, frame.resolution);
-    // As when the map was made.
-    if (dot(cube_pixel_direction(index, frame.resolution), stand.normal) <= 0.0) {
-        float width = 2.0 / float(frame.resolution);
-        float height = dot(stand.normal, cube_direction(face, (vec2(pixel) + 0.5) * width - 1.0));
-        vec2 slope = width * (face < 2u ? stand.normal.yz : face < 4u ? stand.normal.xz : stand.normal.xy);
-        uint axis = abs(slope.x) >= abs(slope.y) ? 0 : 1;
-        if (slope[axis] != 0.0) {
-            float last = float(frame.resolution - 1), steps = min(floor(1.001 - height / abs(slope[axis])), last + 1.0);
-            pixel[axis] = uint(clamp(float(pixel[axis]) + sign(slope[axis]) * steps, 0.0, last));
-            index = cube_pixel_index(face, pixel, frame.resolution);
-        }
-    }
-    return index;
-}
-
-// Whether the four pixels around the point's direction say the same of it; `is_seen` is what, and `told` the share of the
-// way from the map on that they tell of.
-bool surface_map_is_sure(SurfaceMapFrame frame, uint place, MapStand stand, vec3 point, vec3 normal, out bool is_seen, out float told)
-{
-    vec3 d = point - stand.origin;
-    SurfaceMapSight sight = SurfaceMapSight(normal, dot(normal, d), sqrt(dot(d, d)), 1.0 - frame.near_share);
-    uint face = cube_face(d);
-    vec2 at = clamp(cube_place(d, face, frame.resolution) - 0.5, vec2(0.0), vec2(float(frame.resolution) - 1.0));
-    uvec2 low = min(uvec2(at), uvec2(frame.resolution - 2));
-    float sum = 0.0;
-    for (uint k = 0; k < 4; ++k)
-        sum += surface_pixel_seen(frame, sight, place, pixel_above(frame, stand, face, low + uvec2(k & 1, k >> 1)));
-    is_seen = sum > 0.0;
-    told = sight.told;
-    return sum == 0.0 || sum == 4.0;
-}
-
-// Share of the point that is seen from the texel at `place`, whose map stands there; 0 or 1 unfiltered. `told`: the share of
-// the way from the map on that it tells of.
-float surface_map_visibility(SurfaceMapFrame frame, uint place, MapStand stand, vec3 point, vec3 normal, out float told)
-{
-    vec3 d = point - stand.origin;
-    SurfaceMapSight sight = SurfaceMapSight(normal, dot(normal, d), sqrt(dot(d, d)), 1.0 - frame.near_share);
+    vec3 d = point - origin;
+    SurfaceMapSight sight = SurfaceMapSight(normal, dot(normal, d), sqrt(dot(d, d)));
     uint face = cube_face(d);
     uint resolution = frame.resolution;
     vec2 at = cube_place(d, face, resolution);
@@ -152,22 +111,29 @@ float surface_map_visibility(SurfaceMapFrame frame, uint place, MapStand stand, 
         if (frame.filter_mode == 1)
             at += unit_interval(pcg4d(uvec4(floatBitsToUint(point), place)).xy) - 0.5;
         uvec2 pixel = min(uvec2(max(at, vec2(0.0))), uvec2(resolution - 1));
-        float seen = surface_pixel_seen(frame, sight, place, pixel_above(frame, stand, face, pixel));
-        told = sight.told;
-        return seen;
+        return surface_pixel_view(frame, sight, place, cube_pixel_index(face, pixel, resolution));
     }
     // Percentage-closer filtering over the four pixels around; at a face's edge the outer ones count for the inner.
     at = clamp(at - 0.5, vec2(0.0), vec2(float(resolution) - 1.0));
     uvec2 low = min(uvec2(at), uvec2(resolution - 2));
     vec2 t = at - vec2(low);
-    float sum = 0.0;
+    MapView all = MapView(0.0, 1.0);
     for (uint k = 0; k < 4; ++k) {
         uvec2 step = uvec2(k & 1, k >> 1);
         float weight = (step.x == 0 ? 1.0 - t.x : t.x) * (step.y == 0 ? 1.0 - t.y : t.y);
-        if (weight > 0.0)
-            sum += weight * surface_pixel_seen(frame, sight, place, pixel_above(frame, stand, face, low + step));
+        if (weight <= 0.0) continue;
+        MapView view = surface_pixel_view(frame, sight, place, cube_pixel_index(face, low + step, resolution));
+        all = MapView(all.seen + weight * view.seen, min(all.told, view.told));
     }
-    told = sight.told;
-    return sum;
+    return all;
 }
+
+// For views that tell whether the four pixels around say the same of a point.
+SurfaceMapFrame asking_four(SurfaceMapFrame frame)
+{
+    frame.filter_mode = 2;
+    return frame;
+}
+
+bool view_is_sure(MapView of_four) { return of_four.seen < 1e-3 || of_four.seen > 1.0 - 1e-3; }
 #endif

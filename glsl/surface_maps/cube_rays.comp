@@ -1,7 +1,7 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/cube_map.glsl"
 #include "lib/ray.glsl"
+#include "surface_maps/pixel_ray.glsl"
 
 // One thread per pixel of the cube maps of a chunk: its ray; none below the surface.             [Ritschel2008 3.2]
 // reads map_origins, map_normals [place_count] (m, unit)   writes rays[chunk_count * 6 * resolution^2]   shared none
@@ -18,7 +18,7 @@ void main()
     if (i >= params.chunk_count * pixel_count) return;
 
     uint place = params.first_place + i / pixel_count;
-    vec3 direction = cube_pixel_direction(i % pixel_count, params.resolution);
-    bool is_above = dot(direction, map_normals[place]) > 0.0;
-    rays[i] = Ray(map_origins[place], 0.0, direction, is_above ? 3e38 : -1.0);
+    vec3 direction;
+    bool is_asked = map_pixel_ray(i % pixel_count, params.resolution, map_normals[place], direction);
+    rays[i] = Ray(map_origins[place], 0.0, direction, is_asked ? 3e38 : -1.0);
 }

@@ -2,8 +2,8 @@
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
 #include "lib/bvh.glsl"
-#include "lib/cube_map.glsl"
 #include "surface_maps/depth_interval.glsl"
+#include "surface_maps/pixel_ray.glsl"
 #include "trace/holes.glsl"
 
 // One thread per pixel of the cube maps of a chunk: both surfaces along its ray by one walk of our own traversal, and the
@@ -39,8 +39,8 @@ void main()
     if (i >= params.chunk_count * pixel_count) return;
 
     uint place = params.first_place + i / pixel_count;
-    vec3 direction = cube_pixel_direction(i % pixel_count, params.resolution);
-    if (dot(direction, map_normals[place]) <= 0.0) {
+    vec3 direction;
+    if (!map_pixel_ray(i % pixel_count, params.resolution, map_normals[place], direction)) {
         intervals[i] = ANY_DEPTH;
         return;
     }

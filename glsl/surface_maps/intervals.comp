@@ -1,7 +1,7 @@
 #version 460
 #include "lib/prelude.glsl"
-#include "lib/cube_map.glsl"
 #include "surface_maps/depth_interval.glsl"
+#include "surface_maps/pixel_ray.glsl"
 
 // One thread per pixel of the cube maps of a chunk: which depths answer every query right, from the first surface to
 // the second.                                                                                    [Ritschel2008 3.2]
@@ -27,7 +27,8 @@ void main()
     if (i >= params.chunk_count * pixel_count) return;
 
     uint place = params.first_place + i / pixel_count;
-    if (dot(cube_pixel_direction(i % pixel_count, params.resolution), map_normals[place]) <= 0.0) {
+    vec3 direction;
+    if (!map_pixel_ray(i % pixel_count, params.resolution, map_normals[place], direction)) {
         intervals[i] = ANY_DEPTH;
         return;
     }

@@ -4,12 +4,12 @@
 #include "lib/rigid_objects.glsl"
 
 // One thread per pair of texels: whether they see each other, by the maps of objects that move.   [Ritschel2008 3.3]
-// reads pairs[pair_count] (sender, receiver), texels, map_stands (at rest), the maps, the objects
+// reads pairs[pair_count] (sender, receiver), texels, map_origins (at rest), the maps, the objects
 // writes visibility[pair_count] (0..1; -1 where rays must be asked)   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Pairs { uvec2 pairs[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer Texels { AtlasTexel texels[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer MapStands { MapStand map_stands[]; };
+layout(set = 0, binding = 2, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };
 layout(set = 0, binding = 3) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 4) uniform usamplerBuffer runs;
 layout(set = 0, binding = 5, scalar) readonly buffer RigidWords { uint rigid_words[]; };
@@ -26,7 +26,7 @@ RigidPoint point_of(uint texel)
 {
     uint place = rigid_word(rigid_word(RIGID_TEXEL_PLACES) + texel);
     uint object = rigid_word(rigid_word(RIGID_TEXEL_OBJECTS) + texel);
-    return RigidPoint(texels[texel].position, texels[texel].normal, object, place, map_stands[place]);
+    return RigidPoint(texels[texel].position, texels[texel].normal, object, place, map_origins[place]);
 }
 
 void main()

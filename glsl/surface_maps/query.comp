@@ -3,7 +3,7 @@
 #include "lib/surface_map.glsl"
 
 // One thread per query: whether the texel at a place of the sequence sees a point.               [Ritschel2008 3.2]
-// reads queries[query_count], map_stands[place_count], run_offsets, runs   writes visibility[query_count] (0..1)   shared none
+// reads queries[query_count], map_origins[place_count] (m), run_offsets, runs   writes visibility[query_count] (0..1)   shared none
 struct SurfaceMapQuery {
     vec3 point;     // metres
     vec3 normal;    // unit, of the surface there
@@ -11,7 +11,7 @@ struct SurfaceMapQuery {
 };
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) readonly buffer Queries { SurfaceMapQuery queries[]; };
-layout(set = 0, binding = 1, scalar) readonly buffer MapStands { MapStand map_stands[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };
 layout(set = 0, binding = 2) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 3) uniform usamplerBuffer runs;
 layout(set = 0, binding = 4, scalar) writeonly buffer Visibility { float visibility[]; };
@@ -25,6 +25,5 @@ void main()
     uint i = linear_index();
     if (i >= params.query_count) return;
     uint place = queries[i].place;
-    float told;
-    visibility[i] = surface_map_visibility(params.frame, place, map_stands[place], queries[i].point, queries[i].normal, told);
+    visibility[i] = surface_map_view(params.frame, place, map_origins[place], queries[i].point, queries[i].normal).seen;
 }

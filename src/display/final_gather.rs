@@ -295,7 +295,7 @@ impl FinalGather {
                 map_frame: frame,
                 run_offsets: &maps.run_offsets,
                 runs: &maps.runs,
-                map_stands: &maps.stands,
+                map_origins: &maps.origins,
                 leaf_maps: leaf_maps,
                 rigid_words: &moving.words,
                 rigid_objects: &moving.present
@@ -310,7 +310,7 @@ impl FinalGather {
                 map_frame: &placed.frame,
                 run_offsets: &placed.maps.run_offsets,
                 runs: &placed.maps.runs,
-                map_stands: &placed.maps.stands,
+                map_origins: &placed.maps.origins,
                 leaf_maps: &placed.leaf_maps
             ),
             (Tracer::Compute(bvh, surfaces), None) => gather!(

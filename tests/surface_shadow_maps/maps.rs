@@ -62,7 +62,7 @@ impl Asked {
         intervals: &[Interval],
         choose: impl Iterator<Item = (u32, u32)>,
     ) -> Self {
-        let origins: Vec<Vec3> = context.download(&maps.stands).unwrap().iter().map(|stand| stand.origin).collect();
+        let origins: Vec<Vec3> = context.download(&maps.origins).unwrap();
         let mut asked = Self { queries: Vec::new(), expected: Vec::new() };
         for (place, pixel) in choose {
             let interval = intervals[place as usize * maps.maps.pixel_count() + pixel as usize];
@@ -149,7 +149,7 @@ fn drawn_pixels_are_the_filter_in_the_mean() {
     let atlas = fixture.atlas(32);
     let input = fixture.map_input(&atlas, None);
     let maps = SurfaceMaps::new(&context, input, options(8, Sequence::Spiral), &Unwatched).unwrap();
-    let origins: Vec<Vec3> = context.download(&maps.stands).unwrap().iter().map(|stand| stand.origin).collect();
+    let origins: Vec<Vec3> = context.download(&maps.origins).unwrap();
     let random = &mut Random(23);
     let count = 40_000;
     let queries: Vec<SurfaceMapQuery> = (0..count)
@@ -232,10 +232,10 @@ fn small_charts_compress_better_by_sight() {
     assert!(sight > 1.1 * spiral, "{sight} and {spiral}");
 }
 
-/// Pixels below a map's plane are open, and any depth may stand there: a point at the foot of a wall, hardly above the plane,
-/// is not filtered over them.
+/// Pixels below a map's plane are open, and any depth may stand there, but not where a point hardly above the plane, at the
+/// foot of a wall, is filtered over them.
 #[test]
-fn what_lies_below_a_map_is_never_asked() {
+fn pixels_across_the_plane_of_a_map_tell_what_is_above_it() {
     let context = TestContext::new();
     let floor = parallelogram(Vec3::new(-2.0, 0.0, 2.0), Vec3::X * 4.0, Vec3::NEG_Z * 4.0, 1, 0);
     let wall = parallelogram(Vec3::new(2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::Y * 2.0, 1, 0);

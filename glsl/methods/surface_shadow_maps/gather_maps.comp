@@ -16,13 +16,14 @@ layout(set = 0, binding = 1) uniform usamplerBuffer bvh_triangles; // TRIANGLE_T
 layout(set = 0, binding = 2, scalar) readonly buffer MapFrames { SurfaceMapFrame map_frame[]; };
 layout(set = 0, binding = 17) uniform usamplerBuffer run_offsets;
 layout(set = 0, binding = 18) uniform usamplerBuffer runs;
-layout(set = 0, binding = 19, scalar) readonly buffer MapStands { MapStand map_stands[]; };      // by place
+layout(set = 0, binding = 19, scalar) readonly buffer MapOrigins { vec3 map_origins[]; };      // by place
 layout(set = 0, binding = 20, scalar) readonly buffer LeafMapTable { LeafMaps leaf_maps[]; };
 
 uvec4 bvh_node_texel(uint i) { return texelFetch(bvh_nodes, int(i)); }
 uvec4 bvh_triangle_texel(uint i) { return texelFetch(bvh_triangles, int(i)); }
 uvec4 surface_offset_texel(uint i) { return texelFetch(run_offsets, int(i)); }
 uvec4 surface_run_texel(uint i) { return texelFetch(runs, int(i)); }
+vec3 map_origin(uint place) { return map_origins[place]; }
 
 float visibility(vec3 origin, vec3 target, uint leaf);
 
@@ -32,15 +33,9 @@ float visibility(vec3 origin, vec3 target, uint leaf)
 {
     SurfaceMapFrame frame = looked_after(map_frame[0], params.map_stretch);
     vec2 at = place_on_leaf(sender_shape(leaf), target);
-    SenderPlaces asked = sender_places(frame, leaf_maps[leaf], at, origin);
-    float free = 0.0, told = 1.0;
-    for (uint k = 0; k < asked.count; ++k) {
-        float told_by;
-        free += asked.weight[k] * surface_map_visibility(frame, asked.place[k], map_stands[asked.place[k]], origin, receiver.geometric, told_by);
-        told = min(told, told_by);
-    }
-    if (free <= 0.0 || params.map_stretch <= 0.0) return free;
-    return is_hit(traverse(Ray(origin, 0.0, target - origin, looked_after_share(frame, told)), true)) ? 0.0 : free;
+    MapView view = leaf_view(frame, leaf_maps[leaf], at, origin, receiver.geometric);
+    if (view.seen <= 0.0 || params.map_stretch <= 0.0) return view.seen;
+    return is_hit(traverse(Ray(origin, 0.0, target - origin, looked_after_share(frame, view.told)), true)) ? 0.0 : view.seen;
 }
 
 void main() { gather_texel(); }

@@ -67,7 +67,7 @@ impl SurfaceShadowMaps {
                     map_frame: frame,
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
-                    map_stands: &maps.stands,
+                    map_origins: &maps.origins,
                     leaf_maps: leaf_maps,
                     rigid_words: &moving.words,
                     rigid_objects: &moving.present,
@@ -86,7 +86,7 @@ impl SurfaceShadowMaps {
                     textures: surfaces.textures,
                     run_offsets: &maps.run_offsets,
                     runs: &maps.runs,
-                    map_stands: &maps.stands,
+                    map_origins: &maps.origins,
                     leaf_maps: leaf_maps,
                     map_frame: frame,
                 })

@@ -8,7 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// Changes whenever the maps of the same input would come out differently, or are written differently.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 const MAGIC: [u8; 8] = *b"LLSSMAPS";
 
 /// What the maps depend on, as a hash.

@@ -35,7 +35,7 @@ pub use sharing::Sharing;
 use super::trace::{self, Tracer};
 use super::work::{Interrupted, Watch};
 use crate::gpu::shaders::surface_maps as passes;
-use crate::gpu::shaders::types::{Hit, MapStand, Ray, SurfaceMapFrame, SurfaceMapQuery};
+use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::scene::atlas::Atlas;
 use glam::Vec3;
@@ -105,7 +105,7 @@ pub struct SurfaceMaps {
     /// Place in the sequence of the map that each texel looks through.
     pub places: Vec<u32>,
     /// Where the maps stand, by place.
-    pub stands: Buffer<MapStand>,
+    pub origins: Buffer<Vec3>,
     pub run_offsets: TexelBuffer,
     pub runs: TexelBuffer,
     /// How the runs lie in both.
@@ -209,12 +209,10 @@ impl SurfaceMaps {
             }
         };
         let packed = PackedRuns::smallest(&maps);
-        let stands = origins.iter().zip(&normals).map(|(&origin, &normal)| MapStand { origin, normal });
-        let stands: Vec<MapStand> = stands.collect();
         Ok(Self {
             options,
             places,
-            stands: context.upload("surface_maps/stands", &stands)?,
+            origins: context.upload("surface_maps/origins", &origins)?,
             run_offsets: texels(context, "surface_maps/run offsets", &packed.offsets)?,
             runs: texels(context, "surface_maps/runs", &packed.words)?,
             packing: Packing::of(&packed),
@@ -274,7 +272,7 @@ impl SurfaceMaps {
     ) {
         let pass = passes::Query {
             queries,
-            map_stands: &self.stands,
+            map_origins: &self.origins,
             run_offsets: &self.run_offsets,
             runs: &self.runs,
             visibility,

@@ -51,7 +51,7 @@ impl PlacedMaps {
         let pass = passes::MovingQuery {
             pairs,
             texels,
-            map_stands: &self.maps.stands,
+            map_origins: &self.maps.origins,
             run_offsets: &self.maps.run_offsets,
             runs: &self.maps.runs,
             rigid_words: &moving.words,
