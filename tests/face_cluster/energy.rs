@@ -220,3 +220,32 @@ fn a_bar_close_below_a_lamp_takes_its_light() {
         assert!((power / expected - 1.0).abs() < 0.05, "threshold {threshold:e}: {power} W, expected {expected} W");
     }
 }
+
+/// Light that comes through openings which most rays miss is not lost: where all rays were blocked, no more passes unseen
+/// than errors may be elsewhere.
+#[test]
+fn light_comes_through_small_openings() {
+    let context = TestContext::new();
+    let (x, z) = (Vec3::X, Vec3::Z);
+    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
+    let materials = vec![material(0.5), Material { double_sided: true, ..material(0.0) }, material(0.0)];
+    let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 32, 0);
+    let lamp = parallelogram(Vec3::new(-1.0, 2.0, -1.0), 2.0 * x, 2.0 * z, 16, 2);
+    // Between them a plate, one in sixteen of whose cells is open.
+    let mut plate = parallelogram(Vec3::new(-2.0, 1.0, -2.0), 4.0 * z, 4.0 * x, 32, 1);
+    let (corners, cell) = (plate.positions.clone(), 4.0 / 32.0);
+    plate.triangles.retain(|t| {
+        let middle = t.map(|v| corners[v as usize]).iter().sum::<Vec3>() / 3.0 + 2.0;
+        [middle.x, middle.z].iter().any(|&along| (along / cell) as u32 % 4 != 1)
+    });
+    let scene = scene(materials, vec![floor, lamp, plate], &[]);
+    let mut mean = 0.0;
+    // Each threshold meets other openings.
+    for threshold in [1e-3, 3e-4, 1e-4, 3e-5, 1e-5] {
+        let (_, table) = row(&context, &scene, &[2], Settings { threshold, ..Settings::default() }, 1_000_000);
+        let Received { solved, by_rays } = table[0];
+        println!("threshold {threshold:e}: the floor gets {solved:.4} W, by rays {by_rays:.4}");
+        mean += solved / by_rays / 5.0;
+    }
+    assert!((mean - 1.0).abs() < 0.08, "the floor gets {mean} of what comes through");
+}

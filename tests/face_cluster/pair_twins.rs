@@ -95,9 +95,6 @@ fn triangle_vector(x: DVec3, normal: DVec3, corners: [DVec3; 3]) -> DVec3 {
     if sum.dot(normal) < 0.0 { -sum } else { sum }
 }
 
-/// Thresholds of light behind blocked rays that is looked for in the halves.
-const WORTH_LOOKING_ON: f64 = 5.0;
-
 /// Settings of a pass of light.
 #[derive(Clone, Copy)]
 pub struct Way {
@@ -134,8 +131,6 @@ struct Reaching {
     at_nodes: Vec<Vectors>,
     least: Vec<f64>,
     greatest: Vec<f64>,
-    /// No node gets any: light may pass between them, and no ray was asked.
-    is_dark: bool,
     /// The channel that errors are judged by.
     channel: usize,
     /// What the pair says of blocked light.
@@ -174,9 +169,7 @@ impl Reaching {
         quotients.extend(&shares.quotients);
         let is_blocked = shares.of_nodes.iter().all(|&share| share == 0.0);
         if is_blocked {
-            let worth = if self.is_dark { 1.0 } else { WORTH_LOOKING_ON };
-            quotients.push(stake / worth);
-            if stake > worth && split != DONE {
+            if !is_small && split != DONE {
                 return Outcome::new(marked(true), quotients);
             }
             if is_small || measured.is_none() {
@@ -332,7 +325,7 @@ pub fn transport(
     }
     let strongest = unshot[shooter][0];
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
-    let reaching = Reaching { at_nodes, least, greatest, is_dark: false, channel, shadow };
+    let reaching = Reaching { at_nodes, least, greatest, channel, shadow };
     let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
     let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
     let ends = Ends {
@@ -421,7 +414,6 @@ pub fn transport_light(
         at_nodes,
         least,
         greatest: greatest.clone(),
-        is_dark: (0..t.receiver_nodes).all(is_dark),
         shadow: 0,
     };
     let passed = [[a.first_place, a.place_count], [0, 0]];

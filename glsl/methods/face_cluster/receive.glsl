@@ -73,9 +73,6 @@ vec3 node_normal(uint element, uint k) { return unpackSnorm4x8(node_normals[elem
 // Whether the element's cluster has smaller ones below it.
 bool can_split(FaceElement e) { return cluster_skips[e.cluster] != e.cluster + 1; }
 
-// Thresholds of light behind blocked rays that is looked for in the halves: where all rays were free, the like of it
-// passes unnoticed.
-const float WORTH_LOOKING_ON = 5.0;
 // Least vector area that stands for all of an element, as a share of its area.
 const float LEAST_FLAT_SHARE = 0.5;
 

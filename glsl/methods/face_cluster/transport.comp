@@ -150,12 +150,10 @@ void main()
             project(receiver, at_nodes, on_functions);
             break;
         }
-        if (mean <= 0.0) {
-            // What few rays miss is not dark: where that is too much to lose, it is looked for in the halves.
-            if (may_split && a.most_albedo * greatest_of_all > WORTH_LOOKING_ON * params.threshold) {
-                decisions[i] = split | IN_SHADOW;
-                return;
-            }
+        // What few rays miss is not dark: it is looked for in the halves, until all of it is as little as other errors.
+        if (mean <= 0.0 && may_split) {
+            decisions[i] = split | IN_SHADOW;
+            return;
         }
         float all = 0.0;
         seen = 0.0;
@@ -171,7 +169,7 @@ void main()
             if (free[r] == 0.0) greatest[r] = 0.0;
         }
         seen = all > 0.0 ? seen / all : 1.0;
-        if (!may_split || mean <= 0.0) continue;
+        if (!may_split) continue;
         // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
         project(receiver, seen_at, on_functions);
         float error = 0.0;

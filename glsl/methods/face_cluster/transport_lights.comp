@@ -102,8 +102,7 @@ void main()
     float mean_free = sum_free / float(max(ray_count, 1));
     if (sum_free <= 0.0) {
         // As in transport: what may still be free is looked for where it is too much to lose.
-        float worth = ray_count > 0 ? WORTH_LOOKING_ON * params.threshold : params.threshold;
-        if (can_split(a) && a.most_albedo * greatest_of_all > worth) decisions[i] = SPLIT_RECEIVER;
+        if (can_split(a) && !is_small) decisions[i] = SPLIT_RECEIVER;
         return;
     }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
