@@ -1,14 +1,15 @@
 //! Where light goes: what the solver says each part of a scene receives of each other part, beside a plain Monte Carlo
 //! twin that sends rays off the faces themselves.
 
-use crate::common::scenes::{lambert, parallelogram, scene};
+use crate::common::scenes::{lambert, light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, leaves, received};
 use crate::physics::around;
 use glam::Vec3;
 use linklight::gpu::shaders::types::Ray;
 use linklight::methods::face_cluster::Settings;
-use linklight::scene::{Material, Primitive, Scene};
+use linklight::methods::face_cluster::rules::Basis;
+use linklight::scene::{LightKind, Material, Primitive, Scene};
 use linklight::stages::trace::{self, BACK_FACE, NO_HIT, Tracer};
 use std::f32::consts::PI;
 
@@ -248,4 +249,38 @@ fn light_comes_through_small_openings() {
         mean += solved / by_rays / 5.0;
     }
     assert!((mean - 1.0).abs() < 0.08, "the floor gets {mean} of what comes through");
+}
+
+/// The sun through a grating: what the floor then sends to the roof is the same by all functions. Those of higher order
+/// pass through lit and unlit nodes alike, and must not take a border of shadow for their own shape.
+#[test]
+fn borders_of_shadow_are_found_by_all_functions() {
+    let context = TestContext::new();
+    let (x, z) = (Vec3::X, Vec3::Z);
+    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
+    let materials = vec![material(0.5), Material { double_sided: true, ..material(0.0) }, material(0.02)];
+    let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 64, 0);
+    let roof = parallelogram(Vec3::new(-1.0, 1.0, -1.0), 2.0 * x, 2.0 * z, 16, 2);
+    // Beside them, towards the sun: bars and gaps of a fifth of a metre.
+    let mut grating = parallelogram(Vec3::new(1.0, 0.0, -1.0), 2.0 * z, Vec3::Y, 20, 1);
+    let corners = grating.positions.clone();
+    grating.triangles.retain(|t| {
+        let middle = t.map(|v| corners[v as usize]).iter().sum::<Vec3>() / 3.0;
+        (((middle.z + 1.0) / 0.2) as u32).is_multiple_of(2)
+    });
+    let sun = (light(LightKind::Directional, 3.0), Vec3::ZERO, Vec3::new(-1.0, -0.45, 0.3));
+    let fixture = Fixture::new(&context, scene(materials, vec![floor, roof, grating], &[sun]), None);
+    let roof_receives = |irradiance_basis: Basis| {
+        let settings = Settings { irradiance_basis, threshold: 3e-5, ..Settings::default() };
+        let method = fixture.solve(&context, settings, 1);
+        let of_roof = |l: &crate::fixture::Leaf| l.element.albedo.x > 0.01 && l.element.albedo.x < 0.1;
+        let power = |l: crate::fixture::Leaf| f64::from(l.element.area) * f64::from(l.indirect.x);
+        leaves(&context, &method).into_iter().filter(of_roof).map(power).sum::<f64>()
+    };
+    let constant = roof_receives(Basis::Constant);
+    for basis in [Basis::Linear, Basis::Quadratic] {
+        let found = roof_receives(basis) / constant;
+        println!("{basis:?}: the roof gets {found:.3} of what constant functions say, {constant:.4} W");
+        assert!((found - 1.0).abs() < 0.03, "{basis:?}: {found} of what constant functions say");
+    }
 }

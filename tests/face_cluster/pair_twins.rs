@@ -203,7 +203,9 @@ impl Reaching {
                 arrives.iter().enumerate().map(value).sum()
             };
             let off = |r: usize| (said(r) - self.least[r]).max(self.greatest[r] - said(r));
-            let error = (0..t.receiver_nodes).map(off).fold(0.0, f64::max);
+            let share = shares.of_nodes.iter().sum::<f64>() / t.receiver_nodes as f64;
+            let at_border = if !is_pair && share < 0.999 { 0.5 * most } else { 0.0 };
+            let error = (0..t.receiver_nodes).map(off).fold(at_border, f64::max);
             quotients.push(f64::from(a.most_albedo) * error / way.threshold);
             if *quotients.last().unwrap() > 1.0 {
                 return Outcome::new(marked(seen < 0.999), quotients);

@@ -115,7 +115,8 @@ void main()
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
     project(receiver, at_nodes, on_functions);
     if (!is_small && can_split(a)) {
-        float error = 0.0;
+        // Functions through the nodes may meet some that are lit and some that are not, and say nothing of the border between.
+        float error = mean_free < 0.999 ? 0.5 * greatest_of_all : 0.0;
         uint channel = light.intensity.x >= max(light.intensity.y, light.intensity.z) ? 0 : light.intensity.y >= light.intensity.z ? 1 : 2;
         [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
             float said = 0.0;
