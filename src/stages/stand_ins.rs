@@ -5,7 +5,7 @@
 //! Triangles that lie in the open in part have corners inside, as a wall's do behind its skirting, and the display would
 //! draw the darkness out into the room. Decided once, at rest. Nothing here is sent on: what is hidden sends no light.
 //!
-//! What it does not do: elements more than [`RINGS`] neighbours away from the open stay as they are, as do those on
+//! What it does not do: elements more than `RINGS` neighbours away from the open stay as they are, as do those on
 //! surfaces that lie inside of things as a whole; nobody sees them.
 
 use super::elements::ElementTopology;
