@@ -56,7 +56,7 @@ impl AtRest<'_> {
     }
 
     /// Just beside its vertex.
-    pub fn stand(&self, topology: &ElementTopology, entry: u32) -> (Vec3, Vec3) {
+    fn stand(&self, topology: &ElementTopology, entry: u32) -> (Vec3, Vec3) {
         let vertex = entry & !BACK_SIDE;
         let (own, around) = (self.positions[vertex as usize], topology.incident.row(vertex));
         let across: Vec3 = around.iter().map(|&triangle| self.across(triangle, entry)).sum();
@@ -64,6 +64,11 @@ impl AtRest<'_> {
         let middles = around.iter().map(|&triangle| self.corners(triangle).iter().sum::<Vec3>() / 3.0 - own);
         let inward = middles.sum::<Vec3>() / around.len().max(1) as f32;
         (own + BESIDE * (inward - normal * normal.dot(inward)), normal)
+    }
+
+    /// Of each element a point just beside its vertex, metres, and its unit normal.
+    pub fn stands(&self, topology: &ElementTopology) -> (Vec<Vec3>, Vec<Vec3>) {
+        topology.vertices.iter().map(|&entry| self.stand(topology, entry)).unzip()
     }
 
     /// Evenly over some of the triangles around an element.
@@ -94,19 +99,17 @@ fn middles_of_parts() -> impl Iterator<Item = Vec2> {
     cells.flat_map(move |(x, y)| upright(x, y).into_iter().chain(turned(x, y))).map(|at| at / SIDE as f32)
 }
 
-/// The elements that stand inside of other things, in order.
+/// The elements that stand inside of other things, in order, by what is seen from their [`AtRest::stands`].
 pub fn hidden(
     context: &Context,
     at_rest: &AtRest<'_>,
-    topology: &ElementTopology,
+    (points, normals): (&[Vec3], &[Vec3]),
     watch: &dyn Watch,
 ) -> Result<Vec<usize>, HiddenPartsError> {
     if at_rest.positions.iter().any(|position| !position.is_finite()) {
         return Ok(Vec::new());
     }
-    let (points, normals): (Vec<Vec3>, Vec<Vec3>) =
-        topology.vertices.iter().map(|&entry| at_rest.stand(topology, entry)).unzip();
-    let hits = hidden_parts::back_hits(context, &at_rest.tracer, (&points, &normals), at_rest.ray_offset, watch)?;
+    let hits = hidden_parts::back_hits(context, &at_rest.tracer, (points, normals), at_rest.ray_offset, watch)?;
     Ok((0..hits.len()).filter(|&element| hits[element] >= HIDDEN_FROM).collect())
 }
 
@@ -121,7 +124,8 @@ pub fn find(
     let back_hits = |points: &[Vec3], normals: &[Vec3]| {
         hidden_parts::back_hits(context, &at_rest.tracer, (points, normals), at_rest.ray_offset, watch)
     };
-    for elements in hidden(context, at_rest, topology, watch)?.chunks(BATCH) {
+    let (points, normals) = at_rest.stands(topology);
+    for elements in hidden(context, at_rest, (&points, &normals), watch)?.chunks(BATCH) {
         let rows: Vec<Vec<Candidate>> =
             elements.iter().map(|&element| at_rest.candidates(topology, topology.vertices[element])).collect();
         let (points, normals): (Vec<Vec3>, Vec<Vec3>) = rows.iter().flatten().map(|c| (c.point, c.normal)).unzip();

@@ -37,9 +37,8 @@ impl StandIns {
         topology: &ElementTopology,
         watch: &dyn Watch,
     ) -> Result<Self, HiddenPartsError> {
-        let hidden = open_places::hidden(context, at_rest, topology, watch)?;
-        let (points, normals): (Vec<Vec3>, Vec<Vec3>) =
-            topology.vertices.iter().map(|&entry| at_rest.stand(topology, entry)).unzip();
+        let (points, normals) = at_rest.stands(topology);
+        let hidden = open_places::hidden(context, at_rest, (&points, &normals), watch)?;
         Ok(Self::new(context, nearest_in_the_open(&hidden, topology, &points, &normals))?)
     }
 

@@ -1,10 +1,10 @@
 //! Where light goes: what the solver says each part of a scene receives of each other part, beside a plain Monte Carlo
 //! twin that sends rays off the faces themselves.
 
-use crate::common::scenes::{lambert, light, parallelogram, scene};
+use crate::common::scenes::{light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, leaves, received};
-use crate::physics::around;
+use crate::physics::{around, one_sided};
 use glam::Vec3;
 use linklight::gpu::shaders::types::Ray;
 use linklight::methods::face_cluster::Settings;
@@ -114,7 +114,6 @@ fn body(cells: u32, material: u32, at: impl Fn(f32, f32) -> Vec3) -> Primitive {
 /// A room of side 2 with a ball and a post: walls, ball, post.
 fn furnished_room() -> Scene {
     let (x, y, z) = (Vec3::X * 2.0, Vec3::Y * 2.0, Vec3::Z * 2.0);
-    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
     let wall = |corner: Vec3, u: Vec3, v: Vec3| parallelogram(corner, u, v, 10, 0);
     let zero = Vec3::ZERO;
     let walls = [wall(zero, x, y), wall(z, y, x), wall(zero, y, z), wall(x, z, y), wall(zero, z, x), wall(y, x, z)];
@@ -126,7 +125,7 @@ fn furnished_room() -> Scene {
     // A ball pressed into a box.
     let boxed = |p: Vec3| p.clamp(Vec3::splat(-0.5), Vec3::splat(0.5));
     let post = body(16, 2, |u, v| Vec3::new(1.4, 0.61, 1.3) + Vec3::new(0.4, 1.2, 0.4) * boxed(1.2 * on_sphere(u, v)));
-    scene(vec![material(0.7), material(0.6), material(0.5)], walls.into_iter().chain([ball, post]).collect(), &[])
+    scene(vec![one_sided(0.7), one_sided(0.6), one_sided(0.5)], walls.into_iter().chain([ball, post]).collect(), &[])
 }
 
 /// Closed bodies send and take all their light, however little of it meets a shooter or receiver as a whole: their
@@ -153,8 +152,7 @@ fn parts_receive_what_rays_off_the_faces_say() {
 /// A floor of side 2, a board at its middle and a lamp of its size above it: floor, board, lamp.
 fn below_a_lamp(board: (Vec3, Vec3), at: Vec3, lamp_height: f32) -> Scene {
     let (x, z) = (Vec3::X, Vec3::Z);
-    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
-    let mut materials = vec![material(0.5), Material { double_sided: true, ..material(0.25) }, material(0.0)];
+    let mut materials = vec![one_sided(0.5), Material { double_sided: true, ..one_sided(0.25) }, one_sided(0.0)];
     materials[2].emission = Vec3::ONE;
     let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 32, 0);
     let lamp = parallelogram(Vec3::new(-1.0, lamp_height, -1.0), 2.0 * x, 2.0 * z, 16, 2);
@@ -228,8 +226,7 @@ fn a_bar_close_below_a_lamp_takes_its_light() {
 fn light_comes_through_small_openings() {
     let context = TestContext::new();
     let (x, z) = (Vec3::X, Vec3::Z);
-    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
-    let materials = vec![material(0.5), Material { double_sided: true, ..material(0.0) }, material(0.0)];
+    let materials = vec![one_sided(0.5), Material { double_sided: true, ..one_sided(0.0) }, one_sided(0.0)];
     let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 32, 0);
     let lamp = parallelogram(Vec3::new(-1.0, 2.0, -1.0), 2.0 * x, 2.0 * z, 16, 2);
     // Between them a plate, one in sixteen of whose cells is open.
@@ -257,8 +254,7 @@ fn light_comes_through_small_openings() {
 fn borders_of_shadow_are_found_by_all_functions() {
     let context = TestContext::new();
     let (x, z) = (Vec3::X, Vec3::Z);
-    let material = |albedo: f32| Material { double_sided: false, ..lambert(Vec3::splat(albedo)) };
-    let materials = vec![material(0.5), Material { double_sided: true, ..material(0.0) }, material(0.02)];
+    let materials = vec![one_sided(0.5), Material { double_sided: true, ..one_sided(0.0) }, one_sided(0.02)];
     let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 64, 0);
     let roof = parallelogram(Vec3::new(-1.0, 1.0, -1.0), 2.0 * x, 2.0 * z, 16, 2);
     // Beside them, towards the sun: bars and gaps of a fifth of a metre.

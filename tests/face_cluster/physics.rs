@@ -12,7 +12,7 @@ use linklight::scene::{Image, LightKind, Material, TextureRef};
 use linklight::stages::work::{Interrupted, Watch};
 use std::f32::consts::PI;
 
-fn one_sided(albedo: f32) -> Material {
+pub fn one_sided(albedo: f32) -> Material {
     Material { double_sided: false, ..lambert(Vec3::splat(albedo)) }
 }
 
