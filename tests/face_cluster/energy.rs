@@ -5,6 +5,7 @@ use crate::common::scenes::{light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, leaves, received};
 use crate::physics::{around, one_sided};
+use crate::twins;
 use glam::Vec3;
 use linklight::gpu::shaders::types::Ray;
 use linklight::methods::face_cluster::Settings;
@@ -279,4 +280,43 @@ fn borders_of_shadow_are_found_by_all_functions() {
         println!("{basis:?}: the roof gets {found:.3} of what constant functions say, {constant:.4} W");
         assert!((found - 1.0).abs() < 0.03, "{basis:?}: {found} of what constant functions say");
     }
+}
+
+/// The same of a small lamp's light: quadratic functions see the grating's shadow where it lies.
+#[test]
+fn borders_of_a_lamps_shadow_are_found() {
+    let context = TestContext::new();
+    let (x, z) = (Vec3::X, Vec3::Z);
+    let mut materials = vec![one_sided(0.5), Material { double_sided: true, ..one_sided(0.0) }, one_sided(0.0)];
+    materials[2].emission = Vec3::ONE;
+    let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * z, 2.0 * x, 64, 0);
+    let (lamp_height, side, height) = (4.0, 0.02, 0.5);
+    let lamp = parallelogram(Vec3::new(-0.5 * side, lamp_height, -0.5 * side), side * x, side * z, 1, 2);
+    // Bars and gaps of three tenths of a metre.
+    let mut grating = parallelogram(Vec3::new(-1.5, height, -1.5), 3.0 * z, 3.0 * x, 40, 1);
+    let (corners, is_bar) = (grating.positions.clone(), |z: f32| (((z + 1.5) / 0.3) as u32).is_multiple_of(2));
+    grating.triangles.retain(|t| is_bar(t.map(|v| corners[v as usize]).iter().sum::<Vec3>().z / 3.0));
+    let fixture = Fixture::new(&context, scene(materials, vec![floor, lamp, grating], &[]), None);
+    let settings = Settings { irradiance_basis: Basis::Quadratic, ..Settings::default() };
+    let method = fixture.solve(&context, settings, 0);
+    let (state, count) = (method.state(), method.report().elements as usize);
+    let vectors = context.download_range(state.direct(), 0..6 * count).unwrap();
+    let elements = context.download_range(&state.elements, 0..count).unwrap();
+    let of_leaf: Vec<usize> = (0..count).filter(|&e| elements[e].children == u32::MAX).collect();
+    let sides = context.download(state.triangle_leaves()).unwrap();
+    let (mut off, mut sum) = (0.0, 0.0);
+    for (t, side_leaves) in fixture.geometry.triangles.iter().zip(&sides) {
+        let p = t.map(|v| fixture.positions[v as usize]).iter().sum::<Vec3>() / 3.0;
+        if p.y > 1e-3 {
+            continue;
+        }
+        let (element, way) = (of_leaf[side_leaves.x as usize], Vec3::Y * lamp_height - p);
+        let uv = twins::plane_coordinates(&elements[element], p.as_dvec3());
+        let said: f32 = (0..6).map(|k| twins::basis(k, uv) as f32 * vectors[6 * element + k][0][1]).sum();
+        let is_lit = !is_bar(p.z + way.z * height / lamp_height);
+        let expected = if is_lit { (way.y * side / way.length_squared()).powi(2) } else { 0.0 };
+        (off, sum) = (off + (said - expected).abs(), sum + expected);
+    }
+    println!("off by {:.3} of the light, {count} elements, {} transfers", off / sum, method.report().transfers());
+    assert!(off / sum < 0.052, "off by {} of the light", off / sum);
 }

@@ -204,7 +204,7 @@ impl Reaching {
             };
             let off = |r: usize| (said(r) - self.least[r]).max(self.greatest[r] - said(r));
             let share = shares.of_nodes.iter().sum::<f64>() / t.receiver_nodes as f64;
-            let at_border = if !is_pair && share < 0.999 { 0.5 * most } else { 0.0 };
+            let at_border = if (if is_pair { seen } else { share }) < 0.999 { 0.5 * most } else { 0.0 };
             let error = (0..t.receiver_nodes).map(off).fold(at_border, f64::max);
             quotients.push(f64::from(a.most_albedo) * error / way.threshold);
             if *quotients.last().unwrap() > 1.0 {

@@ -103,6 +103,24 @@ void project(uint receiver, mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions
     }
 }
 
+// The error, W: how far bounds lie from what the functions say, in the channel in which the light is strongest; at least half
+// of what `passes` where some of it is blocked: functions may meet lit and unlit nodes alike, and say nothing of the border
+// between.                                                                                     [Gobbetti2003 3.3.2]
+float error_of(FaceElement a, uint receiver, mat3 on_functions[IRRADIANCE_FUNCTIONS], vec3 light, float least[RECEIVER_NODES], float greatest[RECEIVER_NODES], float passes)
+{
+    uint channel = light.x >= max(light.y, light.z) ? 0 : light.y >= light.z ? 1 : 2;
+    float error = 0.5 * passes;
+    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
+        float said = 0.0;
+        vec2 uv = node_coordinates(a, receiver, r);
+        [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
+            said += basis(k, uv) * dot(a.axis_z, on_functions[k][channel]);
+        said *= vector_area(a);
+        error = max(error, max(said - least[r], greatest[r] - said));
+    }
+    return error;
+}
+
 // Adds to what the receiver got so far, in whole units: sums do not depend on their order.
 void receive(uint receiver, mat3 on_functions[IRRADIANCE_FUNCTIONS], float units)
 {

@@ -172,17 +172,7 @@ void main()
         if (!may_split) continue;
         // The error: how far the bounds lie from what the functions say.                       [Gobbetti2003 3.3.2]
         project(receiver, seen_at, on_functions);
-        float error = 0.0;
-        vec3 strongest = unshot[shooter * RADIOSITY_FUNCTIONS];
-        uint channel = strongest.x >= max(strongest.y, strongest.z) ? 0 : strongest.y >= strongest.z ? 1 : 2;
-        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-            float said = 0.0;
-            vec2 uv = node_coordinates(a, receiver, r);
-            [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-                said += basis(k, uv) * dot(a.axis_z, on_functions[k][channel]);
-            said *= vector_area(a);
-            error = max(error, max(said - least[r], greatest[r] - said));
-        }
+        float error = error_of(a, receiver, on_functions, unshot[shooter * RADIOSITY_FUNCTIONS], least, greatest, seen < 0.999 ? greatest_of_all : 0.0);
         if (a.most_albedo * error > params.threshold) {
             decisions[i] = split | (seen < 0.999 ? IN_SHADOW : shadow);
             return;

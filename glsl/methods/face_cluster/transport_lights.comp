@@ -115,17 +115,7 @@ void main()
     mat3 on_functions[IRRADIANCE_FUNCTIONS];
     project(receiver, at_nodes, on_functions);
     if (!is_small && can_split(a)) {
-        // Functions through the nodes may meet some that are lit and some that are not, and say nothing of the border between.
-        float error = mean_free < 0.999 ? 0.5 * greatest_of_all : 0.0;
-        uint channel = light.intensity.x >= max(light.intensity.y, light.intensity.z) ? 0 : light.intensity.y >= light.intensity.z ? 1 : 2;
-        [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-            float said = 0.0;
-            vec2 uv = node_coordinates(a, receiver, r);
-            [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k)
-                said += basis(k, uv) * dot(a.axis_z, on_functions[k][channel]);
-            said *= vector_area(a);
-            error = max(error, max(said - least[r], greatest[r] - said));
-        }
+        float error = error_of(a, receiver, on_functions, light.intensity, least, greatest, mean_free < 0.999 ? greatest_of_all : 0.0);
         if (a.most_albedo * error > params.threshold) {
             decisions[i] = SPLIT_RECEIVER;
             return;
