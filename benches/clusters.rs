@@ -16,6 +16,7 @@ use linklight::scene::pose::Pose;
 use linklight::scene::{self, LoadOptions, Scene, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
+use linklight::stages::trace::Tracer;
 use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
 use std::time::Duration;
@@ -85,7 +86,8 @@ fn row(context: &Context, triangles: u32) -> Result<Row, String> {
         let mut recorder = context.recorder("frame").unwrap();
         let light = method.light(&solution);
         let (world, shadow_maps, g_buffer, view, film) = (&world, &shadow_maps, &g_buffer, &view, &film);
-        let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: 1, film };
+        let tracer = Tracer::compute(&bvh, world);
+        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
         irradiance_vector::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         let records = context.take_records();

@@ -16,7 +16,9 @@ use linklight::scene::environment::Environment;
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::Pose;
 use linklight::scene::{Image, LightKind, Material, Node, Scene, TextureRef};
+use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
+use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
 
@@ -43,7 +45,8 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
     let geometry = Geometry::flatten(scene, 1 << 30).unwrap();
     let pose = Pose::rest(scene);
     let world = World::new(context, scene, &geometry, &pose, &Environment::Constant(Vec3::splat(0.25)), false).unwrap();
-    let bounds = world_vertices(&geometry, &pose).bounds().unwrap();
+    let vertices = world_vertices(&geometry, &pose);
+    let bvh = Bvh::build(context, &vertices.positions, &geometry.triangles).unwrap();
     let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
     let g_buffer = GBuffer::new(context, SIZE, SIZE).unwrap();
     let film = Film::new(context, SIZE, SIZE).unwrap();
@@ -58,9 +61,10 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
         colors: None,
     };
     let mut recorder = context.recorder("frame").unwrap();
-    shadow_maps.draw(&mut recorder, &world, &pose, bounds);
+    shadow_maps.draw(&mut recorder, &world, &pose, vertices.bounds().unwrap());
+    let tracer = Tracer::compute(&bvh, &world);
     let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
-    vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples, film });
+    vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film });
     recorder.submit().unwrap();
     Shown {
         direct: context.download(&film.direct).unwrap(),

@@ -1,17 +1,20 @@
 #ifndef DISPLAY_SEEN
 #define DISPLAY_SEEN
-// What a pixel sees, out of the G-buffer: what the display stages start from, one thread a pixel. Binds 0 to 7 of set 0.
+// What a pixel sees, out of the G-buffer: what the display stages start from, one thread a pixel. Binds 3
+// and 24 to 30 of set 0; where rays are cast as well, 3 is bound by trace/holes.
 #include "lib/brdf.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 0) uniform usampler2D visible_triangles;
-layout(set = 0, binding = 1) uniform sampler2D g_position;
-layout(set = 0, binding = 2) uniform sampler2D g_normal;
-layout(set = 0, binding = 3) uniform sampler2D g_albedo;
-layout(set = 0, binding = 4) uniform sampler2D g_specular;
-layout(set = 0, binding = 5) uniform sampler2D g_emission;
-layout(set = 0, binding = 6, scalar) readonly buffer Triangles { uvec3 triangles[]; };
-layout(set = 0, binding = 7, scalar) readonly buffer Positions { vec3 positions[]; };
+layout(set = 0, binding = 24) uniform usampler2D visible_triangles;
+layout(set = 0, binding = 25) uniform sampler2D g_position;
+layout(set = 0, binding = 26) uniform sampler2D g_normal;
+layout(set = 0, binding = 27) uniform sampler2D g_albedo;
+layout(set = 0, binding = 28) uniform sampler2D g_specular;
+layout(set = 0, binding = 29) uniform sampler2D g_emission;
+#ifndef TRACE_HOLES
+layout(set = 0, binding = 3, scalar) readonly buffer Triangles { uvec3 triangles[]; };
+#endif
+layout(set = 0, binding = 30, scalar) readonly buffer Positions { vec3 positions[]; };
 
 struct Seen {
     uint triangle;

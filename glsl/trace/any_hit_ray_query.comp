@@ -9,6 +9,9 @@
 // reads acceleration_structure, rays[ray_count], the tables of trace/holes   writes visibility[ray_count]: 1 free, 0 blocked   shared none
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 0) uniform accelerationStructureEXT acceleration_structure;
+
+#include "trace/free_ray_query.glsl"
+
 layout(set = 0, binding = 2, scalar) readonly buffer Rays        { Ray rays[]; };                  // ray_count
 layout(set = 0, binding = 7, scalar) writeonly buffer Visibility { uint visibility[]; };             // ray_count
 layout(push_constant, scalar) uniform Params { uint ray_count; } params;
@@ -17,20 +20,5 @@ void main()
 {
     uint i = linear_index();
     if (i >= params.ray_count) return;
-    uint flags = gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsOpaqueEXT;
-    if (ALPHA_TEST) flags = gl_RayFlagsTerminateOnFirstHitEXT;
-    Ray ray = rays[i];
-    bool blocked = false;
-    if (is_active(ray)) {
-        rayQueryEXT query;
-        rayQueryInitializeEXT(query, acceleration_structure, flags, 0xff, ray.origin, ray.t_min, ray.direction, ray.t_max);
-        while (rayQueryProceedEXT(query)) {
-            // With masks every candidate is asked about, without them none.
-            uint triangle = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
-            if (!is_hole(triangle, rayQueryGetIntersectionBarycentricsEXT(query, false)))
-                rayQueryConfirmIntersectionEXT(query);
-        }
-        blocked = rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT;
-    }
-    visibility[i] = blocked ? 0 : 1;
+    visibility[i] = is_free(rays[i]) ? 1 : 0;
 }

@@ -333,7 +333,8 @@ impl Method {
                     };
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     // False colours are those of vertices.
-                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
+                    let (tracer, samples) = (stage.tracer(), request.spp);
+                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
                     match (splat_sums, method.splats(), light.colors) {
                         (Some(sums), Some(splats), None) => {
                             splat::draw(recorder, SplatLight { vertices: light, splats, sums }, canvas);

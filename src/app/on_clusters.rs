@@ -204,7 +204,8 @@ impl ClustersShown {
             match gather.as_ref().filter(|_| !light.shows_colors) {
                 Some(gather) => gather.fill(recorder, stage, light, request.bounces > 0),
                 None => {
-                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
+                    let (tracer, samples) = (stage.tracer(), request.spp);
+                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
                     irradiance_vector::draw(recorder, light, canvas);
                 }
             }

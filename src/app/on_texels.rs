@@ -229,7 +229,8 @@ impl TexelsShown {
                         gloss.draw(recorder, &method.texels, gathered, request.spp);
                     }
                     let (shadow_maps, g_buffer, view) = (&self.shadow_maps, &self.g_buffer, &stage.view);
-                    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples: request.spp, film };
+                    let (tracer, samples) = (stage.tracer(), request.spp);
+                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
                     display.draw(recorder, light, canvas);
                 });
                 Ok(recorder.submit()?)

@@ -10,7 +10,7 @@
 //! [Ritschel2008]: crate::methods::PAPERS
 
 use super::PixelView;
-use super::direct::{self, Sample};
+use super::direct::{Lighting, Sample};
 use super::g_buffer::GBuffer;
 use super::shadow_maps::ShadowMaps;
 use crate::gpu::shaders::display as passes;
@@ -192,7 +192,10 @@ impl FinalGather {
         let size = UVec2::new(film.width, film.height);
         let pixel_view = PixelView::new(from.view, size, sample.index, sample.samples);
         recorder.scope("sample", |recorder| {
-            direct::draw(recorder, from.world, from.shadow_maps, from.g_buffer, &pixel_view, sample, film);
+            let Gathered { world, shadow_maps, tracer, g_buffer, .. } = from;
+            g_buffer.draw(recorder, world, &pixel_view);
+            let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+            lighting.shade(recorder, &pixel_view, sample, world.light_count, film);
             self.gather(recorder, &from, &pixel_view, sample, film);
         });
     }

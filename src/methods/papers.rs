@@ -245,6 +245,14 @@ pub const PAPERS: &[Paper] = &[
         doi: None,
     },
     Paper {
+        key: "Hertel2009",
+        title: "A Hybrid GPU Rendering Pipeline for Alias-Free Hard Shadows",
+        authors: "Stefan Hertel, Kai Hormann, Rüdiger Westermann",
+        year: 2009,
+        venue: "Eurographics (Areas Papers)",
+        doi: None,
+    },
+    Paper {
         key: "Jarzynski2020",
         title: "Hash Functions for GPU Rendering",
         authors: "Mark Jarzynski, Marc Olano",

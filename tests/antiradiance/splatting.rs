@@ -48,7 +48,8 @@ fn splats_reproduce_even_and_linear_light() {
         };
         let light = SplatLight { vertices, splats: method.splats(), sums: &sums };
         let (world, shadow_maps, g_buffer) = (&fixture.world, &shadow_maps, &g_buffer);
-        let canvas = Canvas { world, shadow_maps, g_buffer, view: &view, samples: 1, film: &film };
+        let tracer = fixture.stage().tracer;
+        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view: &view, samples: 1, film: &film };
         splat::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         context.download(&film.indirect).unwrap()

@@ -1,7 +1,7 @@
 //! `display/vertex` against its twin: interpolated irradiance, both lobes of punctual light, the background.
 //!
-//! The G-buffer comes from the device (it has a test of its own); shadow maps are in `tests/display.rs`: nothing here
-//! stands between a surface and a light.
+//! The G-buffer comes from the device (it has a test of its own). What stands between a surface and a light is found by
+//! asking every triangle: shadow maps must answer as rays do, or leave it to rays.
 
 use crate::common::lobe;
 use crate::common::scenes::{lambert, light, parallelogram, scene};
@@ -20,8 +20,10 @@ use linklight::scene::deform::world_vertices;
 use linklight::scene::environment::{Environment, EnvironmentMap};
 use linklight::scene::geometry::Geometry;
 use linklight::scene::pose::{Pose, PosedLight};
-use linklight::scene::{LightKind, Material, Scene};
+use linklight::scene::{LightKind, Material, Node, Primitive, Scene};
+use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
+use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
 
@@ -135,6 +137,23 @@ fn arriving(light: &PosedLight, point: Vec3) -> (Vec3, Vec3) {
     (light.intensity * falloff / offset.length_squared(), offset.normalize())
 }
 
+/// Whether no triangle stands in the way from `point` to the light.
+fn is_free(light: &PosedLight, point: Vec3, triangles: &[[Vec3; 3]]) -> bool {
+    let way = match light.kind {
+        LightKind::Directional => -light.direction * 1e3,
+        _ => light.position - point,
+    };
+    triangles.iter().all(|&[a, b, c]| {
+        let (u, v) = (b - a, c - a);
+        let normal = u.cross(v);
+        let t = normal.dot(a - point) / normal.dot(way);
+        let at = point + t * way - a;
+        let weights = [at.cross(v).dot(normal), u.cross(at).dot(normal)].map(|w| w / normal.length_squared());
+        let is_within = weights[0] >= 0.0 && weights[1] >= 0.0 && weights[0] + weights[1] <= 1.0;
+        !(t > 1e-4 * way.length().recip() && t < 1.0 && is_within)
+    })
+}
+
 /// Lambert under GGX, sr^-1.                                          [Walter2007; Heitz2014; glTF 2.0 B.3]
 pub fn brdf(albedo: Vec4, specular: Vec4, normal: Vec3, alpha: f32, to_eye: Vec3, to_light: Vec3) -> Vec3 {
     let half = (to_eye + to_light).normalize();
@@ -157,6 +176,8 @@ impl Case {
     /// The twin of one sample: adds `weight` of it to `film`.
     fn vertex(&self, surfaces: &Surfaces, offset: Vec2, weight: f32, film: &mut Pictures) {
         let world = world_vertices(&self.geometry, &self.pose);
+        let corners = |triangle: &[u32; 3]| triangle.map(|vertex| world.positions[vertex as usize]);
+        let triangles: Vec<[Vec3; 3]> = self.geometry.triangles.iter().map(corners).collect();
         let is_orthographic = matches!(self.view.lens, Lens::Orthographic { .. });
         for index in 0..(SIZE.x * SIZE.y) as usize {
             let pixel = Vec2::new((index as u32 % SIZE.x) as f32, (index as u32 / SIZE.x) as f32);
@@ -182,7 +203,8 @@ impl Case {
                 let first = if is_back { self.geometry.vertex_count() as usize } else { 0 };
                 for light in &self.pose.lights {
                     let (irradiance, to_light) = arriving(light, point);
-                    if normal.dot(to_light) > 0.0 && geometric.dot(to_light) > 0.0 {
+                    let is_before = normal.dot(to_light) > 0.0 && geometric.dot(to_light) > 0.0;
+                    if is_before && is_free(light, point, &triangles) {
                         let value = brdf(albedo, specular, normal, n.w, to_eye, to_light);
                         direct += value * irradiance * normal.dot(to_light);
                     }
@@ -207,12 +229,19 @@ impl Case {
 
     /// The device's film of `samples` samples, and the twin's.
     fn draw(&self, context: &Context, samples: u32) -> (Pictures, Pictures) {
+        self.draw_by(context, samples, false)
+    }
+
+    /// ... where doubts are settled by the device's own rays, if it has any.
+    fn draw_by(&self, context: &Context, samples: u32, by_query: bool) -> (Pictures, Pictures) {
         let Self { scene, geometry, pose, environment, view, .. } = self;
         let world = World::new(context, scene, geometry, pose, environment, false).unwrap();
         let shadow_maps = ShadowMaps::new(context, pose).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
-        let bounds = world_vertices(geometry, pose).bounds().unwrap();
+        let vertices = world_vertices(geometry, pose);
+        let bvh = Bvh::build(context, &vertices.positions, &geometry.triangles).unwrap();
+        let structure = context.acceleration_structure("test/structure", &world.positions, &world.triangles).unwrap();
         let direct_irradiance = &context.upload("test/direct", &self.direct_irradiance).unwrap();
         let indirect_irradiance = &context.upload("test/indirect", &self.indirect_irradiance).unwrap();
         let count = geometry.vertex_count();
@@ -220,9 +249,14 @@ impl Case {
         let back_elements = &context.upload("test/back elements", &backs).unwrap();
         let light = VertexLight { direct_irradiance, indirect_irradiance, back_elements, colors: None };
         let mut recorder = context.recorder("test").unwrap();
-        shadow_maps.draw(&mut recorder, &world, pose, bounds);
+        if let Some(structure) = structure.as_ref() {
+            recorder.build_acceleration_structure(structure, &world.positions, &world.triangles);
+        }
         let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
-        vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples, film });
+        let by_query = structure.as_ref().filter(|_| by_query).map(|structure| Tracer::ray_query(structure, world));
+        let tracer = by_query.unwrap_or(Tracer::compute(&bvh, world));
+        shadow_maps.draw(&mut recorder, world, pose, vertices.bounds().unwrap());
+        vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film });
         recorder.submit().unwrap();
         let got = Pictures {
             direct: context.download(&film.direct).unwrap(),
@@ -298,5 +332,46 @@ fn vertex_agrees_with_its_twin() {
         case.environment = Environment::Constant(Vec3::splat(0.5));
         let (_, wrong) = case.draw(&context, 1);
         tells_apart(&format!("{name}: another background"), &wrong.direct, &expected.direct, BACKGROUND);
+    }
+}
+
+/// Gratings, a leaning fin that the sun grazes, and waves of a smooth mesh: maps of a few texels a bar can tell their
+/// shadows nowhere near the borders, and every pixel must have what rays find.
+#[test]
+fn shadows_are_those_of_rays() {
+    let context = TestContext::new();
+    let mut case = case(Lens::Perspective { tan_half: Vec2::new(0.75, 0.53) });
+    let mut parts: Vec<Primitive> = Vec::new();
+    for bar in 0..12 {
+        let x = -1.9 + 0.32 * bar as f32;
+        parts.push(parallelogram(Vec3::new(x, 0.9, 1.5), Vec3::X * 0.11, Vec3::new(0.3, 0.2, -3.0), 1, 0));
+    }
+    // The sun comes along the fin but for three degrees.
+    let sun = case.pose.lights.iter().find(|light| light.kind == LightKind::Directional).unwrap().direction;
+    let along = Vec3::new(sun.z, 0.0, -sun.x).normalize();
+    let leaning = sun.cross(along).normalize() * 0.05 - sun.normalize();
+    parts.push(parallelogram(Vec3::new(-1.6, 0.0, -0.6), along * 1.5, leaning * 0.8, 1, 0));
+    let mut waves = parallelogram(Vec3::new(-1.2, 0.25, 1.8), Vec3::X * 2.6, Vec3::NEG_Z * 1.2, 24, 0);
+    for (position, normal) in waves.positions.iter_mut().zip(&mut waves.normals) {
+        *normal = Vec3::new(-0.9 * (9.0 * position.x).cos(), 1.0, 0.0).normalize();
+        position.y += 0.1 * (9.0 * position.x).sin();
+    }
+    parts.push(waves);
+    for part in parts {
+        case.scene.nodes.push(Node { mesh: Some(case.scene.meshes.len() as u32), ..Node::default() });
+        case.scene.meshes.extend(scene(vec![], vec![part], &[]).meshes);
+    }
+    case.geometry = Geometry::flatten(&case.scene, 1 << 30).unwrap();
+    case.pose = Pose::rest(&case.scene);
+    case.direct_irradiance = vec![Vec3::ZERO; 2 * case.geometry.vertex_count() as usize];
+    case.indirect_irradiance = case.direct_irradiance.clone();
+    for by_query in [false, true] {
+        let (got, expected) = case.draw_by(&context, 1, by_query);
+        let is_off = |(got, expected): &(&Vec3, &Vec3)| got.distance(**expected) > 1e-3 * (1.0 + expected.length());
+        let wrong = got.direct.iter().zip(&expected.direct).filter(is_off).count();
+        let dark = expected.direct.iter().filter(|direct| direct.max_element() < 0.02).count();
+        println!("ray query {by_query}: {wrong} of {} pixels are wrong, {dark} are dark", got.direct.len());
+        // A ray may pass an edge on either side by rounding.
+        assert!(wrong <= 3 && dark > 100, "{wrong} wrong, {dark} dark");
     }
 }

@@ -13,8 +13,10 @@ use linklight::gpu::Context;
 use linklight::gpu::shaders::types::LeafElement;
 use linklight::scene::camera::Lens;
 use linklight::scene::deform::world_vertices;
+use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
 use linklight::stages::irradiance_vector::ElementLight;
+use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
 
 const LEAST_ALPHA: f32 = 0.2;
@@ -137,9 +139,13 @@ impl Lit {
             least_alpha: LEAST_ALPHA,
             per_vertex,
         };
+        let positions = world_vertices(geometry, pose).positions;
+        let bvh = Bvh::build(context, &positions, &geometry.triangles).unwrap();
         let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
+        let tracer = Tracer::compute(&bvh, world);
         let mut recorder = context.recorder("test").unwrap();
-        irradiance_vector::draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples: 1, film });
+        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
+        irradiance_vector::draw(&mut recorder, light, canvas);
         g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, 0, 1));
         recorder.submit().unwrap();
         let surfaces = Surfaces::of(context, g_buffer);

@@ -12,7 +12,9 @@ use linklight::display::shadow_maps::ShadowMaps;
 use linklight::scene::atlas::{Atlas, NO_TEXEL, Size};
 use linklight::scene::camera::Lens;
 use linklight::scene::deform::world_vertices;
+use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
+use linklight::stages::trace::Tracer;
 use linklight::stages::world::World;
 use std::f32::consts::PI;
 
@@ -93,9 +95,12 @@ fn lightmap_agrees_with_its_twin() {
         gloss: None,
     };
     let lightmap = Lightmap::new(&context, &atlas).unwrap();
+    let bvh = Bvh::build(&context, &positions, &geometry.triangles).unwrap();
     let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
+    let tracer = Tracer::compute(&bvh, world);
     let mut recorder = context.recorder("test").unwrap();
-    lightmap.draw(&mut recorder, light, Canvas { world, shadow_maps, g_buffer, view, samples: 1, film });
+    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
+    lightmap.draw(&mut recorder, light, canvas);
     let size = UVec2::new(SIZE.x, SIZE.y);
     g_buffer.draw(&mut recorder, world, &PixelView::new(view, size, 0, 1));
     recorder.submit().unwrap();

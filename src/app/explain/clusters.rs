@@ -29,8 +29,8 @@ pub fn explain(
         method.solve(context, &cluster_stage(stage, None, watch), bounces).map_err(AppError::failed)?;
         let solution = method.keep(context).map_err(AppError::failed)?;
         let light = method.light(&solution);
-        let (world, view, samples) = (&stage.world, &stage.view, request.spp);
-        let canvas = Canvas { world, shadow_maps, g_buffer, view, samples, film: &scratch };
+        let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
+        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
         let probe = Probe::new(context, stage, canvas, pixel)?;
         // Light without the method counts once.
         let mut others = Parts::new();

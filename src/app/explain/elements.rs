@@ -113,8 +113,8 @@ fn weights(
     let Frame { context, request, stage, .. } = frame;
     let scratch = Film::new(context, request.width, request.height)?;
     let VertexShown { method, shadow_maps, g_buffer, splat_sums, .. } = shown;
-    let canvas =
-        Canvas { world: &stage.world, shadow_maps, g_buffer, view: &stage.view, samples: request.spp, film: &scratch };
+    let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
+    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     let elements = method.elements();
     let ones: Buffer<Vec3> = context.upload("explain/ones", &vec![Vec3::ONE; elements.count as usize])?;

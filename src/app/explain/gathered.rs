@@ -97,6 +97,7 @@ fn lights(
     let canvas = Canvas {
         world: &stage.world,
         shadow_maps: shown.shadow_maps,
+        tracer: stage.tracer(),
         g_buffer: shown.g_buffer,
         view: &stage.view,
         samples: request.spp,

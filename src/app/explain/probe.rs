@@ -6,7 +6,7 @@ use super::{Parts, add};
 use crate::app::AppError;
 use crate::app::stage::Stage;
 use crate::display::PixelView;
-use crate::display::direct::{self, Canvas, Sample};
+use crate::display::direct::{Canvas, Sample};
 use crate::gpu::{Context, Recorder};
 use crate::report::explanation::Light;
 use crate::scene::LightKind;
@@ -97,13 +97,13 @@ impl<'a> Probe<'a> {
 
     /// Emission or background, then light after light: what each changes of the picture.
     fn add_lights(&self, view: &PixelView, sample: Sample, hits: bool, parts: &mut Parts) -> Result<(), AppError> {
-        let Canvas { world, shadow_maps, g_buffer, film, .. } = self.canvas;
+        let Canvas { world, film, .. } = self.canvas;
         let total = if hits { world.light_count } else { 0 };
         let steps: Vec<u32> = if total <= MOST_LIGHTS { (0..=total).collect() } else { vec![0, total] };
         let mut before = DVec3::ZERO;
         for count in steps {
             let mut recorder = self.context.recorder("explain")?;
-            direct::shade(&mut recorder, (world, shadow_maps, g_buffer), view, sample, count, film);
+            self.canvas.lighting().shade(&mut recorder, view, sample, count, film);
             recorder.submit()?;
             let at = self.at();
             let now = self.context.download_range(&film.direct, at..at + 1)?[0].as_dvec3();

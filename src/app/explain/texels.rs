@@ -25,8 +25,8 @@ pub fn explain(
         return Ok(Vec::new());
     };
     let scratch = Film::new(context, request.width, request.height)?;
-    let (world, view, samples) = (&stage.world, &stage.view, request.spp);
-    let canvas = Canvas { world, shadow_maps, g_buffer, view, samples, film: &scratch };
+    let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
+    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     let ones = context.upload("explain/ones", &vec![Vec3::ONE; method.texels.count as usize])?;
     let zeros = context.upload("explain/zeros", &vec![Vec3::ZERO; method.atlas.texel_at.len()])?;
