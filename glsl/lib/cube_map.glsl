@@ -11,11 +11,9 @@ vec3 cube_direction(uint face, vec2 at)
 }
 
 // Through the middle of a pixel; unit.
-vec3 cube_pixel_direction(uint pixel, uint resolution)
+vec3 cube_pixel_direction(uint face, uvec2 at, uint resolution)
 {
-    uint face = pixel / (resolution * resolution), within = pixel % (resolution * resolution);
-    vec2 at = (vec2(within % resolution, within / resolution) + 0.5) * (2.0 / float(resolution)) - 1.0;
-    return normalize(cube_direction(face, at));
+    return normalize(cube_direction(face, (vec2(at) + 0.5) * (2.0 / float(resolution)) - 1.0));
 }
 
 // Where a direction goes through its face, in pixels from the face's corner.

@@ -87,12 +87,13 @@ struct SurfaceMapSight {
 // the surface's plane is compared with what it met first, so that no slope needs a bias. A plane that the ray meets far
 // from the point, or never, tells nothing of the surface there: then the point's own distance counts.
 // Differs from [Ritschel2008]: they compare the point's distance, with a bias.
-MapView surface_pixel_view(SurfaceMapFrame frame, SurfaceMapSight sight, uint place, uint pixel)
+MapView surface_pixel_view(SurfaceMapFrame frame, SurfaceMapSight sight, uint place, uint face, uvec2 at)
 {
-    float lean = dot(sight.normal, cube_pixel_direction(pixel, frame.resolution));
+    float lean = dot(sight.normal, cube_pixel_direction(face, at, frame.resolution));
     float along = sight.height / (lean == 0.0 ? 1e-30 : lean);
     float width = FARTHEST_PLANE / float(frame.resolution) * sight.distance_to;
     if (!(abs(along - sight.distance_to) <= width)) along = sight.distance_to;
+    uint pixel = cube_pixel_index(face, at, frame.resolution);
     float depth = float(surface_map_depth(frame, place, pixel)), near = along * (1.0 - frame.near_share);
     bool is_seen = min(near * frame.codes_per_metre, 65533.0) <= depth;
     // What only the share left out shows may as well be hidden farther off by what leans away from the pixel's ray.
@@ -113,7 +114,7 @@ MapView surface_map_view(SurfaceMapFrame frame, uint place, vec3 origin, vec3 po
         if (frame.filter_mode == 1)
             at += unit_interval(pcg4d(uvec4(floatBitsToUint(point), place)).xy) - 0.5;
         uvec2 pixel = min(uvec2(max(at, vec2(0.0))), uvec2(resolution - 1));
-        return surface_pixel_view(frame, sight, place, cube_pixel_index(face, pixel, resolution));
+        return surface_pixel_view(frame, sight, place, face, pixel);
     }
     // Percentage-closer filtering over the four pixels around; at a face's edge the outer ones count for the inner.
     at = clamp(at - 0.5, vec2(0.0), vec2(float(resolution) - 1.0));
@@ -124,7 +125,7 @@ MapView surface_map_view(SurfaceMapFrame frame, uint place, vec3 origin, vec3 po
         uvec2 step = uvec2(k & 1, k >> 1);
         float weight = (step.x == 0 ? 1.0 - t.x : t.x) * (step.y == 0 ? 1.0 - t.y : t.y);
         if (weight <= 0.0) continue;
-        MapView view = surface_pixel_view(frame, sight, place, cube_pixel_index(face, low + step, resolution));
+        MapView view = surface_pixel_view(frame, sight, place, face, low + step);
         all = MapView(all.seen + weight * view.seen, min(all.told, view.told));
     }
     return all;
