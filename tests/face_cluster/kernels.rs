@@ -69,7 +69,7 @@ fn check_normals(g: &Grown, found: &[u32]) {
 fn check_fits(g: &Grown, fits: &[f32], means: &[f32]) {
     let clear = |found: &[f32], own: &[f32]| {
         let row = found.len() / g.elements.len();
-        let is_clear = |e: usize| g.elements[e].place_count > 1 || g.is_clear[e].iter().all(|&clear| clear);
+        let is_clear = |e: usize| !twins::is_flat(&g.elements[e]) || g.is_clear[e].iter().all(|&clear| clear);
         let chosen = (0..found.len()).filter(|k| is_clear(k / row));
         chosen.map(|k| (found[k], f64::from(own[k]))).unzip::<f32, f64, Vec<f32>, Vec<f64>>()
     };

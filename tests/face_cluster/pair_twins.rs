@@ -1,6 +1,6 @@
 //! Twins of what decides pairs: visibility, transport, bounds and splits.
 
-use crate::twins::{Tables, Vectors, basis, fit, node_coordinates, vector_area};
+use crate::twins::{Tables, Vectors, basis, fit, is_flat, node_coordinates, vector_area};
 use crate::way_twins::{Blockers, Ends, Shares, free_ways, shares_of, visibility};
 use glam::{DVec3, Vec3};
 use linklight::gpu::shaders::types::{FaceElement, Light};
@@ -288,7 +288,7 @@ pub fn transport(
         let off = DVec3::from_array(axes(e).map(|axis| d.dot(axis).abs())) - half;
         let squared = off.max(DVec3::ZERO).length_squared().max(1e-20);
         let away = (squared / half.length_squared()).sqrt();
-        quotients.extend([2.0 * away, 0.5 * away]);
+        quotients.extend([2.0 * away, 0.5 * away, 0.1 * away]);
         [away, if away < 0.5 { (f64::from(e.area) / (PI * squared)).min(1.0) } else { 0.0 }]
     };
     let near_power = brightest * f64::from(b.area) * nearness(a, b.center.as_dvec3())[1];
@@ -298,7 +298,7 @@ pub fn transport(
         let [away, share] = nearness(b, x);
         let around = if b.place_count == 1 { 0.0 } else { brightest * f64::from(a.area) * share };
         is_far &= away > 2.0;
-        let (mut vectors, mut sum) = ([DVec3::ZERO; 3], 0.0);
+        let (mut vectors, mut sum, mut passed) = ([DVec3::ZERO; 3], 0.0, DVec3::ZERO);
         let (mut low, mut high, mut sends) = (f64::INFINITY, near_power.max(around), false);
         for (e, rule) in shooter_rule.iter().enumerate() {
             let d = nodes[shooter][t.receiver_nodes + e].as_dvec3() - x;
@@ -311,15 +311,20 @@ pub fn transport(
             let kept = share * kept_vector(t, a, direction);
             sends |= share > 0.0;
             sum += kept.length();
+            passed += kept.length() * sent[e];
             (0..3).for_each(|c| vectors[c] += sent[e][c] * kept);
         }
-        if b.place_count == 1 && sends {
+        if sends && (b.place_count == 1 || b.place_count <= 8 && is_flat(b) && away < 10.0) {
+            let mean = if sum > 0.0 { passed / sum } else { sent[0] };
             let inst = &t.instances[b.instance as usize];
-            let corners = t.corners(t.triangle_at(inst, b.first_place - inst.first_triangle));
-            let exact = triangle_vector(x, a.axis_z.as_dvec3(), corners);
+            let faces = (0..b.place_count).map(|f| t.triangle_at(inst, b.first_place + f - inst.first_triangle));
+            let side = if inst.is_back != 0 { -1.0 } else { 1.0 };
+            let is_seen = |[p, q, s]: &[DVec3; 3]| side * (q - p).cross(s - p).dot(x - p) > 0.0;
+            let seen = faces.map(|f| t.corners(f)).filter(is_seen);
+            let exact: DVec3 = seen.map(|corners| triangle_vector(x, a.axis_z.as_dvec3(), corners)).sum();
             sum = exact.length();
             let kept = if sum > 0.0 { sum * kept_vector(t, a, exact / sum) } else { DVec3::ZERO };
-            vectors = [0, 1, 2].map(|c| kept * sent[0][c]);
+            vectors = [0, 1, 2].map(|c| kept * mean[c]);
         }
         at_nodes.push(vectors.map(|v| v / sum.max(1.0)));
         least.push(low);

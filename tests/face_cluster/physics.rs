@@ -60,8 +60,11 @@ fn form_factors_of_plates() {
 fn the_furnace_gains_half_of_each_bounce() {
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("furnace"), Some(0.5));
-    let settings = Settings { convergence: 0.0, ..Settings::default() };
-    for bounces in [0, 3u32] {
+    // A leaf is off by the sum of the errors that each of its transfers may have; more functions leave less of them.
+    for (irradiance_basis, bounces, most) in
+        [(Basis::Linear, 0, 0.035), (Basis::Linear, 3u32, 0.042), (Basis::Quadratic, 0, 0.02)]
+    {
+        let settings = Settings { convergence: 0.0, irradiance_basis, ..Settings::default() };
         let method = fixture.solve(&context, settings, bounces);
         let leaves = leaves(&context, &method);
         let (power, area) = received(&leaves, |_| true);
@@ -74,9 +77,13 @@ fn the_furnace_gains_half_of_each_bounce() {
             println!("furnace, {}: {:.3} % of what is shot arrives", pass.name, 100.0 * share);
             assert!((share - 1.0).abs() < 5e-3, "{}: {share}", pass.name);
         }
-        println!("furnace, {bounces} bounces: mean off by {:.3} %, a leaf by {:.3} %", 100.0 * error, 100.0 * worst);
+        println!(
+            "furnace, {irradiance_basis:?}, {bounces} bounces: mean off by {:.3} %, a leaf by {:.3} %",
+            100.0 * error,
+            100.0 * worst
+        );
         assert!(error.abs() < 1e-2, "{bounces} bounces: {error}");
-        assert!(worst < 0.2, "{bounces} bounces: {worst}");
+        assert!(worst < most, "{irradiance_basis:?}, {bounces} bounces: {worst}");
     }
 }
 

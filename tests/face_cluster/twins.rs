@@ -233,7 +233,12 @@ pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
 
 /// Where node `k` of an element counts as standing in its square.
 pub fn node_coordinates(t: &Tables, e: &FaceElement, nodes: &[Vec3], k: usize) -> DVec2 {
-    if e.place_count == 1 { plane_coordinates(e, nodes[k].as_dvec3()) } else { t.rules_of(e)[k].uv.as_dvec2() }
+    if is_flat(e) { plane_coordinates(e, nodes[k].as_dvec3()) } else { t.rules_of(e)[k].uv.as_dvec2() }
+}
+
+/// Whether the faces lie in one plane, nearly.
+pub fn is_flat(e: &FaceElement) -> bool {
+    e.place_count == 1 || vector_area(e) > 0.99 * f64::from(e.area)
 }
 
 /// `fit_functions`: a row a function, a column a receiver node; and the functions' means. By Gauss and Jordan.
@@ -244,9 +249,11 @@ pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Ve
         .collect();
     let weights: Vec<f64> = t.rules_of(e)[..t.receiver_nodes].iter().map(|rule| f64::from(rule.weight)).collect();
     let sum = |j: usize, k: usize| -> f64 { at.iter().zip(&weights).map(|(b, w)| w * b[j] * b[k]).sum() };
+    let fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
     let mut rows: Vec<Vec<f64>> = (0..functions)
         .map(|j| {
-            let squares = (0..functions).map(|k| sum(j, k) + if j == k { 1e-3 } else { 0.0 });
+            let ridge = if j < 3 || fills { 1e-3 } else { 0.1 };
+            let squares = (0..functions).map(|k| sum(j, k) + if j == k { ridge } else { 0.0 });
             squares.chain(at.iter().zip(&weights).map(|(b, w)| w * b[j])).collect()
         })
         .collect();

@@ -10,6 +10,8 @@ const uint TRIES = 8;
 const float LEAST_EXPOSED = 1.0 / 32.0;
 // Added to the squares of functions, so that nodes that stand in a row, or at one place, say no more than they can.
 const float RIDGE = 1e-3;
+// Of those that are not linear, on flat faces that do not fill their square.
+const float HIGHER_RIDGE = 0.1;
 
 // The nearest point of a triangle.                                                             [Ericson2004 5.1.5]
 vec3 nearest_of_triangle(vec3 p, vec3 a, vec3 b, vec3 c)
@@ -134,10 +136,10 @@ float self_form_factor(float area)
     return 2.0 * sum / float(RULE_NODES * (RULE_NODES - 1));
 }
 
-// Where a receiver node counts as standing: a face's where it is, others where the rule has them.
+// Where a receiver node counts as standing: a flat element's where it is, others where the rule has them.
 vec2 node_coordinates(uint index, FaceElement e, uint r)
 {
-    return e.place_count == 1 ? plane_coordinates(e, element_nodes[index * RULE_NODES + r]) : rules[r].uv;
+    return is_flat(e) ? plane_coordinates(e, element_nodes[index * RULE_NODES + r]) : rules[r].uv;
 }
 
 // By how much what arrives at each receiver node makes each function: least squares, with the mean as the nodes say it;
@@ -148,10 +150,11 @@ void fit_functions(uint index, FaceElement e)
 {
     const uint N = IRRADIANCE_FUNCTIONS;
     uint rule = e.place_count == 1 ? RULE_NODES : 0;
+    bool fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
     float gram[IRRADIANCE_FUNCTIONS * IRRADIANCE_FUNCTIONS], means[IRRADIANCE_FUNCTIONS], column[IRRADIANCE_FUNCTIONS];
     [[dont_unroll]] for (uint j = 0; j < N; ++j) {
         means[j] = 0.0;
-        [[dont_unroll]] for (uint k = 0; k < N; ++k) gram[j * N + k] = j == k ? RIDGE : 0.0;
+        [[dont_unroll]] for (uint k = 0; k < N; ++k) gram[j * N + k] = j != k ? 0.0 : j < 3 || fills ? RIDGE : HIGHER_RIDGE;
     }
     [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
         vec2 uv = node_coordinates(index, e, r);

@@ -87,10 +87,10 @@ vec3 kept_vector(FaceElement e, vec3 direction)
     return (along > 0.0 ? direction : vec3(0.0)) + beyond / max(vector_area(e), LEAST_FLAT_SHARE * e.area) * e.axis_z;
 }
 
-// Where a node counts as standing in its element's square: a face's where it is, others where the rule has them.
+// Where a node counts as standing in its element's square: a flat one's where it is, others where the rule has them.
 vec2 node_coordinates(FaceElement e, uint element, uint k)
 {
-    return e.place_count == 1 ? plane_coordinates(e, receiver_node(element, k)) : rules[k].uv;
+    return is_flat(e) ? plane_coordinates(e, receiver_node(element, k)) : rules[k].uv;
 }
 
 // What arrived at the receiver's nodes (a column a channel), on its functions.                 [Gobbetti2003 Eq. 7]

@@ -22,11 +22,29 @@ layout(push_constant, scalar) uniform Params {
     float wider;        // where light is blocked: times the receiver's area that a shooter may have before it is split first
 } params;
 
+// Flat shooters of so few faces, and nearer than so many half diagonals, are measured exactly.
+const uint EXACT_FACES = 8;
+const float EXACT_REACH = 10.0;
+
 // Nearer to an element than half its size, its nodes do not tell how large it looks: the most of the hemisphere that it may
 // fill, and 0 farther off.
 float nearness(FaceElement e, float squared)
 {
     return squared < 0.25 * dot(e.half_extent, e.half_extent) ? min(1.0, e.area / (PI * squared)) : 0.0;
+}
+
+// Irradiance vector at x, above its plane, of those of few faces of radiosity 1 that look at x.
+vec3 exact_vector(FaceElement b, vec3 x, vec3 normal)
+{
+    ClusterInstance inst = instances[b.instance];
+    float side = inst.is_back != 0 ? 1.0 : -1.0;    // edges counterclockwise as seen from x make a vector away
+    vec3 sum = vec3(0.0);
+    [[dont_unroll]] for (uint f = 0; f < b.place_count; ++f) {
+        uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + b.first_place + f - inst.first_triangle]];
+        vec3 of_face = side * triangle_vector(x, normal, vec3[3](positions[v.x], positions[v.y], positions[v.z]));
+        if (dot(of_face, normal) > 0.0) sum += of_face;
+    }
+    return sum;
 }
 
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
@@ -75,14 +93,7 @@ void main()
     mat3 at_nodes[RECEIVER_NODES];
     float least[RECEIVER_NODES], greatest[RECEIVER_NODES];
     float greatest_of_all = 0.0;
-    // A single face is measured exactly: neighbours stand nearer than nodes can tell.
-    bool is_face = b.place_count == 1;
-    vec3 corners[3];
-    if (is_face) {
-        ClusterInstance inst = instances[b.instance];
-        uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + b.first_place - inst.first_triangle]];
-        corners = vec3[3](positions[v.x], positions[v.y], positions[v.z]);
-    }
+    bool is_face = b.place_count == 1, is_exact = b.place_count <= EXACT_FACES && is_flat(b);
     // Differs from [Gobbetti2003]: bounds between nodes alone miss what touches, or lies close above.
     float near_power = brightest * b.area * nearness(a, squared_distance(a, b.center));
     bool is_far = true;
@@ -94,6 +105,7 @@ void main()
         greatest[r] = is_face ? near_power : max(near_power, brightest * a.area * nearness(b, off));
         is_far = is_far && off > 4.0 * dot(b.half_extent, b.half_extent);
         float sum = 0.0;
+        vec3 sent = vec3(0.0);
         bool sends = false;
         [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
             vec3 d = shooter_node(shooter, e) - x;
@@ -107,13 +119,14 @@ void main()
             vec3 kept = share * kept_vector(a, direction);
             sends = sends || share > 0.0;
             sum += length(kept);
+            sent += length(kept) * radiosity[e];
             at_nodes[r] += outerProduct(kept, radiosity[e]);
         }
-        if (is_face && sends) {
-            vec3 exact = triangle_vector(x, a.axis_z, corners);
-            if (dot(exact, a.axis_z) < 0.0) exact = -exact;
+        // Neighbours stand nearer than nodes can tell, and those of faces that do not fill a square stand unevenly.
+        if (sends && (is_face || is_exact && off < EXACT_REACH * EXACT_REACH * dot(b.half_extent, b.half_extent))) {
+            vec3 mean = sum > 0.0 ? sent / sum : radiosity[0], exact = exact_vector(b, x, a.axis_z);
             sum = length(exact);
-            at_nodes[r] = sum > 0.0 ? outerProduct(sum * kept_vector(a, exact / sum), radiosity[0]) : mat3(0.0);
+            at_nodes[r] = sum > 0.0 ? outerProduct(sum * kept_vector(a, exact / sum), mean) : mat3(0.0);
         }
         // No surface receives more than a hemisphere of the shooter's light.
         if (sum > 1.0) at_nodes[r] /= sum;
