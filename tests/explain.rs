@@ -111,6 +111,16 @@ fn lights_and_backgrounds_are_told_by_name() {
     assert!(text.contains(" light "), "{text}");
 }
 
+/// Of a wall whose corners stand behind its skirting and show, smoothed, what arrives beside it.
+#[test]
+fn corners_inside_of_things_are_told_as_what_they_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = "builtin:office --size 160x100 --elements 2000 --bounces 1 --spp 4 --method antiradiance --diffuse";
+    let (text, json, pixel) = explained(folder.path(), scene, [17, 70]);
+    assert!(text.contains("`skirting`") && text.contains("`walls`"), "{text}");
+    assert!(difference(&json, pixel) < 1e-4, "{text}");
+}
+
 /// Links made by two logical devices: the same file, to the byte.
 #[test]
 fn a_second_device_for_links_changes_nothing() {

@@ -71,6 +71,11 @@ pub trait OnElements {
         false
     }
 
+    /// Whose light an element shows: its own, unless it is hidden.
+    fn shown_by(&self, element: u32) -> u32 {
+        element
+    }
+
     /// Flat patches for the splatting display, if the method has them.
     fn splats(&self) -> Option<&Splats> {
         None
@@ -262,6 +267,10 @@ impl OnElements for Antiradiance {
 
     fn carried_to(&self, context: &Context, elements: &[u32]) -> Result<Vec<Vec<Carried>>, AppError> {
         Ok(Self::carried_to(self, context, elements)?)
+    }
+
+    fn shown_by(&self, element: u32) -> u32 {
+        Self::shown_by(self, element)
     }
 
     fn bounces_add_up(&self) -> bool {

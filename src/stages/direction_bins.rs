@@ -24,7 +24,7 @@ crate::choice! {
         None = "none",
         /// Over the bins within the sender's solid angle, by a Gaussian of a bin's width
         Gaussian = "gaussian",
-        /// Over the bins that the sender covers: a flat one by samples of its rectangle, others evenly within a cone
+        /// Over the bins that the sender covers: a flat one by samples of its rectangle, from close by as its sides cut them, others evenly within a cone
         Cone = "cone",
     }
 }

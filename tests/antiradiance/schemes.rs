@@ -115,7 +115,7 @@ fn the_last_bounce_of_symmetric_steps_crosses_walls() {
 /// `cargo bench --bench antiradiance` goes on for 300 steps.
 #[test]
 fn the_office_settles_over_many_steps() {
-    const STEPS: u32 = 100;
+    const STEPS: u32 = 160;
     let context = TestContext::new();
     let fixture = Fixture::new(&context, builtin_scene("office"), None);
     // Four steps of antiradiance to one of light, as in the paper.

@@ -65,6 +65,14 @@ pub fn scales(nodes: &[HierarchyNode], leaves: &[HierarchyLeaf], links: &[[u32; 
             for (k, place) in [own.center, to.center].into_iter().enumerate() {
                 let offset = place - from.center;
                 let w = offset.normalize();
+                let (u, v) = (from.half_u, from.half_v);
+                let is_close = offset.length_squared() < 16.0 * (u.length_squared() + v.length_squared());
+                let is_beside = normal.dot(offset).abs() >= 0.999 * (normal.dot(u).abs() + normal.dot(v).abs());
+                if shape.is_some() && is_close && is_beside {
+                    let irradiance = rectangle_irradiance(offset.as_dvec3(), [u, v], normal.as_dvec3());
+                    sums[2 * own.leaf as usize + usize::from(irradiance < 0.0)][k] += irradiance.abs();
+                    continue;
+                }
                 let turned = shape.map_or(0.5, |leaf| leaf.normal.dot(w).abs());
                 let disc = f64::from(from.area * turned / offset.length_squared() / PI);
                 let solid_angle = 2.0 * std::f64::consts::PI * (1.0 - 1.0 / (1.0 + disc).sqrt());
@@ -133,6 +141,18 @@ impl Transferring<'_> {
         Some((bin, received * sent))
     }
 
+    /// What of a bin's width around a direction, `whole` of which counts, lies on a rectangle (middle, half sides), as seen from
+    /// the origin: by the angle's sine to each of its sides.
+    fn share_of_bin(&self, direction: Vec3, middle: Vec3, sides: [Vec3; 2], whole: f32) -> f32 {
+        let within = |side: Vec3, along: Vec3| {
+            let across = (middle + side).cross(along).normalize_or_zero();
+            let inwards = across.dot(direction) * across.dot(middle).signum();
+            ((0.5 + inwards / self.bins.solid_angle().sqrt()) / whole).clamp(0.0, 1.0)
+        };
+        let [u, v] = sides;
+        (within(u, v) + within(-u, v) - 1.0).max(0.0) * (within(v, u) + within(-v, u) - 1.0).max(0.0)
+    }
+
     /// (receiver's cell, sender's entry, weight) from one node to another.
     pub fn transfers(&self, sender: u32, receiver: u32) -> Vec<(u32, u32, f32)> {
         let (from, to) = (&self.nodes[sender as usize], &self.nodes[receiver as usize]);
@@ -157,18 +177,54 @@ impl Transferring<'_> {
         let entry = |bin: u32, read: u32, weight: f32| (receiver * m + bin, sender * m + read, weight);
         let is_hidden = |v: Vec3| p.is_some_and(|(normal, _, passes_behind)| passes_behind && normal.dot(v) >= 0.0);
 
+        // Whether a flat sender's light along `v` arrives at a side of the receiver that its centre is on, or, of what the
+        // receiver stands on, a quarter of it.
+        let reaches = |v: Vec3| {
+            let (Some((normal, ..)), Some((sends, ..))) = (p, q) else { return true };
+            let reach = normal.dot(from.half_u).abs() + normal.dot(from.half_v).abs();
+            let (arrives_in_front, behind) = (normal.dot(v) < 0.0, normal.dot(offset));
+            let stands_on = sends.dot(offset) > 0.0 && behind < 0.5 * reach;
+            !is_hidden(v) && if arrives_in_front { behind <= 0.0 || stands_on } else { behind > 0.0 }
+        };
+
+        let is_facing = |sends: Vec3| sends.dot(offset) > 0.0 && p.is_some_and(|(normal, ..)| normal.dot(offset) < 0.0);
+        let is_on_its_way = |sends: Vec3, v: Vec3| v.dot(offset) > 0.0 || is_facing(sends);
+
+        // A rectangle close by, bin by bin.
+        let sides = [from.half_u, from.half_v];
+        let is_close = squared < 4.0 * sides.iter().map(|half| half.length_squared()).sum::<f32>();
+        let is_close = is_close && rectangle_solid_angle(offset.as_dvec3(), sides) > f64::from(self.bins.solid_angle());
+        let is_flat_cone = self.class_count > 0 && !self.is_gaussian;
+        if let (Some((normal, norm, _)), true) = (q, is_flat_cone && (is_close || coverage > 4.0)) {
+            // Of a bin's width, what lies on its side of a plane.
+            let on_side = |cosine: f32| (0.5 + cosine.abs() / self.bins.solid_angle().sqrt()).min(1.0);
+            let shares = self.bins.directions.iter().map(|v| {
+                let received = p.map_or(1.0, |(normal, ..)| on_side(normal.dot(*v)));
+                (self.share_of_bin(-*v, -offset, sides, on_side(normal.dot(*v))) / received).min(1.0)
+            });
+            let own = shares.zip(0..).filter(|&(share, bin)| {
+                let v = self.bins.directions[bin as usize];
+                share > 0.0 && normal.dot(v) * normal.dot(w) > 0.0 && reaches(v) && is_on_its_way(normal, v)
+            });
+            let sent = |bin: u32| discrete_cosine(normal.dot(self.bins.directions[bin as usize]), norm, m);
+            return own.map(|(share, bin)| entry(bin, bin, share / sent(bin))).collect();
+        }
+
         // A rectangle, sample by sample.
-        if let (Some((normal, ..)), true) = (q, coverage <= 4.0 && self.class_count > 0 && !self.is_gaussian) {
+        if let (Some((normal, ..)), true) = (q, is_flat_cone) {
             let side = ((2.0 * coverage.sqrt()).ceil() as u32).clamp(1, 4);
             let mut found: Vec<(u32, f32, f32)> = Vec::new();
             for (i, j) in (0..side * side).map(|s| (s % side, s / side)) {
                 let [a, b] = [i, j].map(|k| (k as f32 + 0.5) / side as f32 * 2.0 - 1.0);
                 let offset = to.center - (from.center + a * from.half_u + b * from.half_v);
                 let (squared, w) = (offset.length_squared(), offset.normalize());
-                if is_hidden(w) {
+                if !reaches(w) {
                     continue;
                 }
                 let Some((bin, weight)) = self.carried(p, q, w) else { continue };
+                if !is_on_its_way(normal, self.bins.directions[bin as usize]) {
+                    continue;
+                }
                 let own = disc(from.area / (side * side) as f32 * normal.dot(w).abs() / squared);
                 let covered = own / self.bins.solid_angle();
                 match found.iter_mut().find(|(other, ..)| *other == bin) {
@@ -189,7 +245,7 @@ impl Transferring<'_> {
         let list: Vec<&SpreadEntry> = self
             .list(size_class, self.bins.bin_of(w))
             .iter()
-            .filter(|e| q.is_none_or(|(normal, ..)| normal.dot(at(e.bin)) * normal.dot(w) > 0.0))
+            .filter(|e| [p, q].iter().flatten().all(|(normal, ..)| normal.dot(at(e.bin)) * normal.dot(w) > 0.0))
             .collect();
         let total: f32 = list.iter().map(|e| e.weight).sum();
         let mut found = Vec::new();
@@ -197,13 +253,36 @@ impl Transferring<'_> {
             let read = if self.is_gaussian { list[0].bin } else { bin };
             let mut share = coverage * weight / total;
             if let Some((normal, norm, _)) = q {
-                share = if self.is_gaussian { share } else { share.min(1.0) };
                 share /= discrete_cosine(normal.dot(at(read)), norm, m);
             }
             found.push(entry(bin, read, share));
         }
         found
     }
+}
+
+/// Of a rectangle (half of its sides) from a place `offset` from its middle, as two triangles (Van Oosterom and Strackee 1983).
+fn rectangle_solid_angle(offset: DVec3, sides: [Vec3; 2]) -> f64 {
+    let [u, v] = sides.map(Vec3::as_dvec3);
+    let triangle = |corners: [DVec3; 3]| {
+        let [a, b, c] = corners.map(|corner| (corner - offset).normalize());
+        2.0 * a.dot(b.cross(c)).abs().atan2(1.0 + a.dot(b) + b.dot(c) + c.dot(a))
+    };
+    triangle([u + v, u - v, -u - v]) + triangle([u + v, v - u, -u - v])
+}
+
+/// Irradiance from a rectangle of radiance 1, as above, on a surface of that normal; negative at its back: by many small parts.
+fn rectangle_irradiance(offset: DVec3, sides: [Vec3; 2], normal: DVec3) -> f64 {
+    const PARTS: u32 = 48;
+    let [u, v] = sides.map(Vec3::as_dvec3);
+    let area = 4.0 * u.cross(v).length() / f64::from(PARTS * PARTS);
+    let at = |k: u32| (f64::from(k) + 0.5) / f64::from(PARTS) * 2.0 - 1.0;
+    let part = |k: u32| {
+        let way = at(k % PARTS) * u + at(k / PARTS) * v - offset;
+        let w = way.normalize();
+        area * w.dot(u.cross(v).normalize()).abs() * w.dot(normal) / way.length_squared()
+    };
+    (0..PARTS * PARTS).map(part).sum()
 }
 
 /// Incident radiance of all nodes along `transfers`, pushed down to the leaves.

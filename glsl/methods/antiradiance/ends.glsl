@@ -63,4 +63,25 @@ float weight_between(End p, End q, vec3 w, vec3 v, float covered)
     if (p.is_flat) covered *= abs(dot(p.normal, w)) / discrete_cosine(dot(p.normal, v), p.norm, params.bins.count);
     return q.is_flat ? covered / discrete_cosine(dot(q.normal, v), q.norm, params.bins.count) : covered;
 }
+
+const uint FRONT = 1, BACK = 2;
+
+// Sides of the receiver that a flat sender reaches: the one that its centre is on. A rectangle is not its shape, and would light
+// floors from below the walls on them. Only of what the receiver stands on, as a shelf does on a wall, much may lie on either side.
+// No two then send each other light along one bin.
+uint sides_reached(End q, End p, vec3 offset)
+{
+    if (!p.is_flat) return FRONT | BACK;
+    float behind = dot(p.normal, offset), reach = abs(dot(p.normal, q.half_u)) + abs(dot(p.normal, q.half_v));
+    bool is_on_both = behind > 0.0 && behind < 0.5 * reach && dot(q.normal, offset) > 0.0;
+    uint sides = (behind <= 0.0 || is_on_both ? FRONT : 0u) | (behind > 0.0 ? BACK : 0u);
+    return p.passes_behind ? sides & FRONT : sides;
+}
+
+// Whether light along v may go from q to p. Rectangles are not the shapes, and three that stand about an edge could send
+// antiradiance around in a circle, without end: but where two face each other, light goes the way that their centres lie.
+bool is_on_its_way(End q, End p, vec3 offset, vec3 v)
+{
+    return dot(v, offset) > 0.0 || (p.is_flat && dot(q.normal, offset) > 0.0 && dot(p.normal, offset) < 0.0);
+}
 #endif

@@ -15,12 +15,14 @@ layout(set = 0, binding = 2, scalar) buffer AtLeaves { uint at_leaves[]; };
 layout(set = 0, binding = 3, scalar) buffer Excess { uint excess[]; };
 layout(push_constant, scalar) uniform Params { uint link_count; } params;
 
+const float CLOSE = 16.0;
 const float FIXED = 262144.0;       // 2^18
 const float CLUSTER_COSINE = 0.5;   // of surfaces that look all ways, on average
 
 // An end of a link: what of its node and shape is needed.
 struct Side {
     vec3 center, normal;    // 0: without a shape
+    vec3 half_u, half_v;    // of a flat one's rectangle
     float area;
     uint node, leaf, skip;
     bool is_flat, sends_behind;
@@ -28,18 +30,22 @@ struct Side {
 
 Side side_of(uint node)
 {
-    uvec4 place = NODE_TEXEL(node, 0), shape = NODE_TEXEL(node, 1), ends = NODE_TEXEL(node, 4);
+    uvec4 place = NODE_TEXEL(node, 0), shape = NODE_TEXEL(node, 1), last = NODE_TEXEL(node, 3), ends = NODE_TEXEL(node, 4);
     bool is_flat = ends.y != NONE;
-    bool sends_behind = !is_flat || (NODE_TEXEL(node, 3).w & REFLECTS_BEHIND) != 0;
-    return Side(uintBitsToFloat(place.xyz), uintBitsToFloat(shape.xyz), uintBitsToFloat(shape.w), node, place.w, ends.x, is_flat,
-                sends_behind);
+    return Side(uintBitsToFloat(place.xyz), uintBitsToFloat(shape.xyz), uintBitsToFloat(NODE_TEXEL(node, 2).xyz),
+                uintBitsToFloat(last.xyz), uintBitsToFloat(shape.w), node, place.w, ends.x, is_flat,
+                !is_flat || (last.w & REFLECTS_BEHIND) != 0);
 }
 
 // Signed by the side of the leaf that it arrives at: front positive.
 float irradiance_of(Side from, vec3 place, vec3 normal)
 {
     vec3 offset = place - from.center;
-    float squared = max(dot(offset, offset), 1e-30);
+    float squared = max(dot(offset, offset), 1e-30), height = dot(normal, offset);
+    if (from.is_flat && squared < CLOSE * (dot(from.half_u, from.half_u) + dot(from.half_v, from.half_v))
+        && abs(height) >= 0.999 * (abs(dot(normal, from.half_u)) + abs(dot(normal, from.half_v)))) {
+        return rectangle_irradiance(offset, from.half_u, from.half_v, normal);
+    }
     vec3 w = offset / sqrt(squared);
     float turned = from.is_flat ? abs(dot(from.normal, w)) : CLUSTER_COSINE;
     return -dot(normal, w) * disc_solid_angle(from.area * turned / squared);

@@ -9,7 +9,7 @@
 // bin that the sender covers.                                                        [Dachsbacher2007 Eqs. 15 to 17]
 // Differs from [Dachsbacher2007]: at leaves, and nodes within a flat surface, the cosines of the actual direction stand in for those of the bin, bins lie on
 // the side of the surface that the direction lies on, and a sender is read in each bin that it covers, not in one (its own
-// "accurate CPU implementation"): a flat one by samples of its rectangle, a large or uneven one by a cone. Nothing then
+// "accurate CPU implementation"): a flat one by samples of its rectangle, from close by as its sides cut the bins, an uneven one by a cone. Nothing then
 // passes from one bin into another, and the footprints of a surface's parts tile as the parts do, so that what the surface
 // lets through and what it takes away cancel bin by bin.
 #include "methods/antiradiance/ends.glsl"
@@ -18,14 +18,14 @@ void transfers_follow(uint count);
 void transfer(uint receiver, uint receiver_bin, uint sender, uint sender_bin, float weight);
 
 const uint SAMPLES_A_SIDE = 4;              // of a footprint, at most
-const float MOST_SAMPLED = 4.0;             // bins: larger footprints are cones
+const float MOST_SAMPLED = 4.0;             // bins: larger footprints are cut out
 
 // A flat sender's rectangle, sample by sample: footprints that tile a surface tile the bins.
 void sampled(uint sender, uint receiver, End q, End p, float coverage)
 {
     uint side = clamp(uint(ceil(2.0 * sqrt(coverage))), 1u, SAMPLES_A_SIDE), count = side * side;
     // Samples side by side mostly fall into one bin, and most senders into one alone: what is summed up, and then those before.
-    uint current = NONE, found = 0;
+    uint current = NONE, found = 0, sides = sides_reached(q, p, p.center - q.center);
     vec2 sum = vec2(0.0);                               // weight, and what is covered, in bins
     uint bins[SAMPLES_A_SIDE * SAMPLES_A_SIDE];
     vec2 sums[SAMPLES_A_SIDE * SAMPLES_A_SIDE];
@@ -38,10 +38,10 @@ void sampled(uint sender, uint receiver, End q, End p, float coverage)
             float squared = dot(offset, offset);
             if (!(squared > 0.0)) continue;
             vec3 w = offset / sqrt(squared);
-            if (p.passes_behind && dot(p.normal, w) >= 0.0) continue;
+            if ((sides & (dot(p.normal, w) < 0.0 ? FRONT : BACK)) == 0) continue;
             vec3 v;
             bin = bin_between(p, q, w, v);
-            if (bin == NONE) continue;
+            if (bin == NONE || !is_on_its_way(q, p, p.center - q.center, v)) continue;
             float covered = disc_solid_angle(q.area / float(count) * abs(dot(q.normal, w)) / squared) * float(params.bins.count) / FOUR_PI;
             own = vec2(weight_between(p, q, w, v, covered), covered);
             if (bin == current) {
@@ -72,6 +72,45 @@ void sampled(uint sender, uint receiver, End q, End p, float coverage)
     for (uint k = 0; k < found; ++k) transfer(receiver, bins[k], sender, bins[k], sums[k].x / max(sums[k].y, 1.0));
 }
 
+// A flat sender close by, bin by bin: from beside a wall samples of it lie too far apart, and a cone is not its shape. Each pair of
+// opposite sides holds, of a bin's width, what lies between the planes through them and the receiver; of a bin that a surface's own
+// plane cuts only the part on the bin's side of it counts as the bin, so that a wall down to the floor fills the bins above the floor.
+void clipped(uint sender, uint receiver, End q, End p, vec3 offset)
+{
+    vec3 inwards[4];                                    // across the planes, over a bin's width
+    float per_width = sqrt(float(params.bins.count) / FOUR_PI);
+    for (uint k = 0; k < 4; ++k) {
+        vec3 to_side = k < 2 ? q.half_u : q.half_v, along = k < 2 ? q.half_v : q.half_u;
+        vec3 normal = cross((k & 1) == 0 ? to_side - offset : -to_side - offset, along);
+        float size = length(normal);
+        inwards[k] = size > 0.0 ? normal * ((dot(normal, offset) < 0.0 ? per_width : -per_width) / size) : vec3(0.0);
+    }
+    float q_cos = dot(q.normal, offset);
+    uint sides = sides_reached(q, p, offset);
+    // Twice: how many bins there are is asked for first.
+    uint found = 0;
+    for (uint round = 0; round < 2; ++round) {
+        if (round == 1) transfers_follow(found);
+        // Of two opposite bins one is on the side of the sender that the receiver is on.
+        for (uint first = 0; first < params.bins.count; first += 2) {
+            vec3 v = BIN_DIRECTION(first);
+            float sent_cos = dot(q.normal, v);
+            uint bin = sent_cos * q_cos > 0.0 ? first : first + 1;
+            if (bin != first) v = -v;
+            float received_cos = dot(p.normal, v);
+            if (sent_cos == 0.0 || (sides & (received_cos < 0.0 ? FRONT : BACK)) == 0 || !is_on_its_way(q, p, offset, v)) continue;
+            float in_front_of_q = min(0.5 + per_width * abs(sent_cos), 1.0);
+            vec4 held;
+            for (uint k = 0; k < 4; ++k) held[k] = clamp((0.5 - dot(inwards[k], v)) / in_front_of_q, 0.0, 1.0);
+            float share = max(held.x + held.y - 1.0, 0.0) * max(held.z + held.w - 1.0, 0.0);
+            if (!(share > 0.0)) continue;
+            if (p.is_flat) share /= min(0.5 + per_width * abs(received_cos), 1.0);
+            if (round == 0) ++found;
+            else transfer(receiver, bin, sender, bin, min(share, 1.0) / discrete_cosine(sent_cos, q.norm, params.bins.count));
+        }
+    }
+}
+
 void transfers_of(uint sender, uint receiver, End q, End p)
 {
     vec3 offset = p.center - q.center;
@@ -87,8 +126,11 @@ void transfers_of(uint sender, uint receiver, End q, End p)
     float coverage = solid_angle * float(params.bins.count) / FOUR_PI;
 
     bool is_cone = params.bins.class_count > 0 && params.bins.is_gaussian == 0;
-    if (is_cone && q.is_flat && coverage <= MOST_SAMPLED) {
-        sampled(sender, receiver, q, p, coverage);
+    if (is_cone && q.is_flat) {
+        bool is_close = squared < 4.0 * (dot(q.half_u, q.half_u) + dot(q.half_v, q.half_v))
+            && rectangle_solid_angle(offset, q.half_u, q.half_v) * float(params.bins.count) > FOUR_PI;
+        if (is_close || coverage > MOST_SAMPLED) clipped(sender, receiver, q, p, offset);
+        else sampled(sender, receiver, q, p, coverage);
         return;
     }
     // The class above, so that no bin is covered more than once and nothing is cut off.
@@ -112,7 +154,7 @@ void transfers_of(uint sender, uint receiver, End q, End p)
     uint read_bin = NONE;
     for (uint k = first; k < last; ++k) {
         vec3 v = BIN_DIRECTION(spread[k].bin);
-        if (q.is_flat && dot(q.normal, v) * q_cos <= 0.0) continue;
+        if (!is_between(p, q, v, dot(p.normal, w), q_cos)) continue;
         if (read_bin == NONE) read_bin = spread[k].bin;
         if (!(p.passes_behind && dot(p.normal, v) >= 0.0)) found += 1;
         total += spread[k].weight;
@@ -122,11 +164,10 @@ void transfers_of(uint sender, uint receiver, End q, End p)
     for (uint k = first; k < last; ++k) {
         uint bin = spread[k].bin;
         vec3 v = BIN_DIRECTION(bin);
-        if ((q.is_flat && dot(q.normal, v) * q_cos <= 0.0) || (p.passes_behind && dot(p.normal, v) >= 0.0)) continue;
+        if (!is_between(p, q, v, dot(p.normal, w), q_cos) || (p.passes_behind && dot(p.normal, v) >= 0.0)) continue;
         float weight = coverage * spread[k].weight / total;
         if (params.bins.is_gaussian == 0) {
             read_bin = bin;
-            if (q.is_flat) weight = min(weight, 1.0);
         } else {
             v = BIN_DIRECTION(read_bin);
         }

@@ -153,7 +153,7 @@ fn weights(
         });
         let shares = by_patches.unwrap_or_else(|| of_corners(&probe, triangle, &seen, elements));
         for (element, share) in shares {
-            *weights.entry(element).or_default() += f64::from(share) * reflectance;
+            *weights.entry(method.shown_by(element)).or_default() += f64::from(share) * reflectance;
         }
     }
     Ok((weights, names))

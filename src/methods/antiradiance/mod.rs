@@ -27,7 +27,7 @@
 //!
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the
 //! cosines and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat
-//! one by samples of its rectangle (selectable); open surfaces block light that meets their backs; incident radiance
+//! one by samples of its rectangle, from close by as its sides cut the bins (selectable); open surfaces block light that meets their backs; incident radiance
 //! may not fall far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes
 //! are nodes of their own; near senders are discs, never more than half of the sphere; links are made on the device,
 //! none between solids back to back; what a leaf receives along links of the nodes above is scaled to what an even
@@ -369,6 +369,11 @@ impl Antiradiance {
     /// From punctual lights, unreflected; W/m2 per element.
     pub fn punctual_irradiance(&self) -> &Buffer<Vec3> {
         &self.state.punctual
+    }
+
+    /// Whose light an element shows: its own, unless it stands inside of something.
+    pub fn shown_by(&self, element: u32) -> u32 {
+        self.stand_ins.of(element)
     }
 
     pub fn settings(&self) -> &Settings {
