@@ -3,7 +3,7 @@
 // Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
 //
 // Bridges: the kernel binds the runs of all pixels, as texels of four words.
-//     uvec4 surface_offset_texel(uint i)     where the runs of each pixel's blocks start; the next one's ends them
+//     uvec4 surface_offset_texel(uint i)     where the runs of three of the pixels' blocks start, and where the last ends
 //     uvec4 surface_run_texel(uint i)        depths, two a word; from firsts_at where runs start in their blocks
 #include "lib/cube_map.glsl"
 #include "lib/random.glsl"
@@ -36,8 +36,8 @@ uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
 {
     uint bits = frame.block_bits, mask = (1u << bits) - 1, shift = bits == 8 ? 4 : 3;
     uint block = pixel * frame.block_count + (place >> bits), within = place & mask;
-    uint low = word_of(surface_offset_texel(block >> 2), block & 3);
-    uint high = word_of(surface_offset_texel(block + 1 >> 2), block + 1 & 3);
+    uvec4 starts_at = surface_offset_texel(block / 3);
+    uint low = word_of(starts_at, block % 3), high = word_of(starts_at, block % 3 + 1);
     uint texel = low >> shift, last = high - 1 >> shift;
     while (texel < last) {
         uint middle = texel + last + 1 >> 1;
