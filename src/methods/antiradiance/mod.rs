@@ -27,15 +27,15 @@
 //!
 //! Differs from [Dachsbacher2007]: a leaf is both sides of its vertex's cell and sits at the cell's centre; the
 //! cosines and bins at leaves are those of the actual direction; a sender is read in every bin that it covers, a flat
-//! one by samples of its rectangle, from close by as its sides cut the bins (selectable); open surfaces block light that meets their backs; incident radiance
-//! may not fall far below zero (selectable); both schemes are damped where changes grow; flat parts of rounded meshes
-//! are nodes of their own; near senders are discs, never more than half of the sphere; links are made on the device,
-//! none between solids back to back; what a leaf receives along links of the nodes above is scaled to what an even
-//! light would bring to the leaf itself (selectable). A patch of a flat part is made of the cells of its vertices, one
-//! or many ([`Settings::leaves`]). Direct light of punctual lights and sampled emitters is that of shadow rays.
-//! Elements inside of other things, dark by their neighbours' negative light, show what arrives at the nearest in the
-//! open (`stages::stand_ins`). Glossy leaves reflect their incident bins through their lobes, none narrower than a
-//! bin.
+//! one by samples of its rectangle, from close by as the rectangle's sides cut the bins (selectable); open surfaces
+//! block light that meets their backs; incident radiance may not fall far below zero (selectable); both schemes are
+//! damped where changes grow; flat parts of rounded meshes are nodes of their own; farther senders are discs, never more
+//! than half of the sphere; links are made on the device, none between solids back to back; what a leaf receives along
+//! links of the nodes above is scaled to what an even light would bring to the leaf itself (selectable). A patch of a
+//! flat part is made of the cells of its vertices, one or many ([`Settings::leaves`]). Direct light of punctual lights
+//! and sampled emitters is that of shadow rays. Elements inside of other things, dark by their neighbours' negative
+//! light, show what arrives at the nearest in the open (`stages::stand_ins`). Glossy leaves reflect their incident bins
+//! through their lobes, none narrower than a bin.
 //! What it does not do: transparent surfaces, refinement by the light that is sent.
 //!
 //! [Dachsbacher2007]: crate::methods::PAPERS

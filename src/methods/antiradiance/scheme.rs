@@ -10,8 +10,9 @@ use serde::Serialize;
 const GROWTH_LIMIT: f64 = 1e4;
 /// Steps over which a growth rate is estimated.
 const GROWTH_STEPS: usize = 4;
-/// Changes of the light below this share are rounding.
-const LEAST_CHANGE: f64 = 1e-3;
+/// Changes of the light below these shares are rounding: of tables in f16, and in f32.
+const LEAST_CHANGE_F16: f64 = 1e-3;
+const LEAST_CHANGE: f64 = 1e-5;
 /// Share of a step below which the symmetric scheme gives up.
 const LEAST_DAMPING: f32 = 1.0 / 16.0;
 /// Steps of antiradiance alone that may rise unwatched: as many as surfaces stand one behind the other, errors grow first.
@@ -63,10 +64,10 @@ fn spectral_radius(residuals: &[Residual], damping: f32) -> f64 {
     growth_rate(residuals).map_or(f64::INFINITY, |rate| (rate - 1.0 + share) / share)
 }
 
-/// Whether changes rise, every other step's on its own: an iteration may swing between two states.
-fn is_rising(residuals: &[Residual]) -> bool {
+/// Whether changes rise by more than rounding, every other step's on its own: an iteration may swing between two states.
+fn is_rising(residuals: &[Residual], least_change: f64) -> bool {
     match residuals {
-        [_, .., a, b, c, d] => c.change > a.change && d.change > b.change && d.relative() > LEAST_CHANGE,
+        [_, .., a, b, c, d] => c.change > a.change && d.change > b.change && d.relative() > least_change,
         _ => false,
     }
 }
@@ -125,7 +126,7 @@ impl Antiradiance {
                     watch.step("antiradiance", u64::from(bounce) - 1, bounces.into())?;
                     self.settle(context, bounce, false)?;
                     // Bounces of few steps hand on what has not settled.
-                    if is_rising(&bounce_ends(&self.residuals[first..])) && self.damp() {
+                    if self.is_rising(&bounce_ends(&self.residuals[first..])) && self.damp() {
                         first = self.residuals.len();
                     }
                     // The last of the steps that settle antiradiance is also what the next bounce reflects.
@@ -161,7 +162,7 @@ impl Antiradiance {
                 LocalStep { reflects: true, sets_floor: iteration == 1, bounced, damping, ..LocalStep::default() };
             self.step_once(context, iteration, step)?;
             let own = &self.residuals[first..];
-            if !is_rising(own) {
+            if !self.is_rising(own) {
                 continue;
             }
             let rate = spectral_radius(own, damping);
@@ -171,6 +172,10 @@ impl Antiradiance {
             first = self.residuals.len();
         }
         Ok(())
+    }
+
+    fn is_rising(&self, residuals: &[Residual]) -> bool {
+        is_rising(residuals, if self.tables.half { LEAST_CHANGE_F16 } else { LEAST_CHANGE })
     }
 
     /// Halves the share of steps; `false` where it is as small as it may be.
@@ -201,7 +206,7 @@ impl Antiradiance {
             if !cuts && residual.relative() < f64::from(self.settings.tolerance) {
                 break;
             }
-            if self.residuals.get(first..).is_some_and(is_rising) && self.damp() {
+            if self.residuals.get(first..).is_some_and(|own| self.is_rising(own)) && self.damp() {
                 first = self.residuals.len();
             }
         }
@@ -291,10 +296,11 @@ mod tests {
 
     #[test]
     fn swinging_without_growth_is_not_rising() {
-        assert!(!is_rising(&residuals(&[3.0, 1.0, 2.9, 0.9, 2.8])));
-        assert!(is_rising(&residuals(&[3.0, 1.0, 3.1, 1.1, 3.2])));
-        assert!(!is_rising(&residuals(&[1.0, 2.0, 3.0, 4.0])), "too few to tell");
-        assert!(!is_rising(&residuals(&[1e-5, 2e-5, 3e-5, 4e-5, 5e-5])), "rounding");
+        let is_rising = |changes: &[f64]| is_rising(&residuals(changes), LEAST_CHANGE);
+        assert!(!is_rising(&[3.0, 1.0, 2.9, 0.9, 2.8]));
+        assert!(is_rising(&[3.0, 1.0, 3.1, 1.1, 3.2]));
+        assert!(!is_rising(&[1.0, 2.0, 3.0, 4.0]), "too few to tell");
+        assert!(!is_rising(&[1e-6, 2e-6, 3e-6, 4e-6, 5e-6]), "rounding");
     }
 
     #[test]
