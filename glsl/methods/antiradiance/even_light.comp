@@ -15,7 +15,7 @@ layout(set = 0, binding = 2, scalar) buffer AtLeaves { uint at_leaves[]; };
 layout(set = 0, binding = 3, scalar) buffer Excess { uint excess[]; };
 layout(push_constant, scalar) uniform Params { uint link_count; } params;
 
-const float CLOSE = 16.0;
+const float CLOSE = 16.0;           // squared distance over a rectangle's squared half sides: nearer ones are no discs
 const float FIXED = 262144.0;       // 2^18
 const float CLUSTER_COSINE = 0.5;   // of surfaces that look all ways, on average
 
