@@ -102,7 +102,7 @@ pub struct PapersArgs {
     /// Rows of this method's paper, see `linklight methods`; may be repeated [default: all]
     #[arg(long, value_name = "KEY", value_parser = parse_method)]
     pub method: Vec<&'static Method>,
-    /// Only rows whose place ("Table 1"), words or scene contain this text
+    /// Only rows whose place ("Table 1"), words or scene contain this text; a number counts whole
     #[arg(long, value_name = "TEXT")]
     pub only: Option<String>,
     /// Leave out what takes minutes on a software driver

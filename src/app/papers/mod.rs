@@ -52,7 +52,7 @@ pub fn run(
     rows.retain(|row| args.method.is_empty() || args.method.iter().any(|method| method.key == row.method));
     if let Some(text) = &args.only {
         let text = text.to_lowercase();
-        rows.retain(|row| format!("{} {} {}", row.place, row.what, row.on).to_lowercase().contains(&text));
+        rows.retain(|row| names(&format!("{} {} {}", row.place, row.what, row.on).to_lowercase(), &text));
     }
     if rows.is_empty() {
         let message =
@@ -89,6 +89,17 @@ pub fn run(
         writeln!(out, "{}\nopen {}", report.summary(), args.output.join("index.html").display())?;
     }
     Ok(())
+}
+
+/// Whether a text holds another, not as a piece of a longer number: "Fig. 1" is not named by "Fig. 11".
+fn names(all: &str, text: &str) -> bool {
+    let is_digit = |c: Option<char>| c.is_some_and(|c| c.is_ascii_digit());
+    all.match_indices(text).any(|(at, _)| {
+        let (before, behind) = (&all[..at], &all[at + text.len()..]);
+        let is_cut = |outer, inner| is_digit(outer) && is_digit(inner);
+        !is_cut(before.chars().next_back(), text.chars().next())
+            && !is_cut(behind.chars().next(), text.chars().next_back())
+    })
 }
 
 /// What was measured so far.
@@ -273,6 +284,19 @@ mod tests {
                 assert_eq!(run.request.bounces, reference.request.bounces);
             }
         }
+    }
+
+    #[test]
+    fn a_figure_is_chosen_without_those_that_begin_like_it() {
+        let places = |text: &str| -> Vec<&str> {
+            let chosen = rows().into_iter().filter(|row| names(&row.place.to_lowercase(), text));
+            chosen.filter(|row| row.method == "surface-shadow-maps").map(|row| row.place).collect()
+        };
+        assert_eq!(places("fig. 1"), ["Fig. 1"]);
+        assert_eq!(places("fig. 17"), ["Fig. 17"]);
+        assert!(places("fig.").len() > 6, "without a number all are");
+        assert!(names("table 12, 2 bounces", "2 bounces") && !names("table 12 bounces", "2 bounces"));
+        assert!(names("fig. 11, then fig. 1", "fig. 1"), "a later place counts");
     }
 
     #[test]

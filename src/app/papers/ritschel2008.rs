@@ -167,9 +167,10 @@ pub fn rows() -> Vec<Row> {
 
 /// Figures without numbers.
 fn pictures() -> [Row; 6] {
-    let shown = |scene: &str, options: &str| {
-        format!("builtin:{scene} {METHOD_OPTION} --bounces 1 --size 240x150 --spp 4 {options}")
+    let bounced = |bounces: u32, scene: &str, options: &str| {
+        format!("builtin:{scene} {METHOD_OPTION} --bounces {bounces} --size 240x150 --spp 4 {options}")
     };
+    let shown = |scene: &str, options: &str| bounced(1, scene, options);
     let glossy = "--edit material:0.roughness=0.3 --edit material:0.metallic=1";
     [
         Row::pictures(
@@ -177,7 +178,8 @@ fn pictures() -> [Row; 6] {
             "Fig. 1",
             ("two bounces and a glossy one, gathered by pixels", "normal maps at 0.4 to 1.4 frames a second"),
             "several scenes",
-            &["tea-room", "office"].map(|scene| (scene, shown(scene, "--set visibility=rays --display final-gather"))),
+            &["tea-room", "office"]
+                .map(|scene| (scene, bounced(2, scene, "--set visibility=rays --display final-gather"))),
         )
         .slow(),
         Row::views(
@@ -212,8 +214,8 @@ fn pictures() -> [Row; 6] {
             ("a glossy box without jitter and with it", "the bias of the senders shows; jittered frames converge"),
             "highly glossy Cornell Box",
             &[
-                ("without jitter", shown("cornell-box", &format!("{glossy} --set jitter=false"))),
-                ("jittered", shown("cornell-box", &format!("{glossy} --set jitter=true"))),
+                ("without jitter", shown("cornell-box", &format!("{glossy} --set gather_jitter=false"))),
+                ("jittered", shown("cornell-box", &format!("{glossy} --set gather_jitter=true"))),
             ],
         )
         .slow(),
