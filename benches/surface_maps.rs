@@ -1,7 +1,11 @@
 //! Surface shadow maps and the final gather in one run, as ratios: look-ups in compressed maps against shadow rays between
 //! the same points, making maps against casting the same rays alone, gathers of pixels and of texels, memory.
 //!
-//! `LINKLIGHT_BENCH_SCENE` names another scene than the church, `LINKLIGHT_BENCH_ATLAS` another atlas than 128 texels a side.
+//! How much of the look-ups' time goes by in waiting for memory is told by the same look-ups of a few pairs alone, which stay in
+//! the caches, and by bare fetches in a row over as many bytes; how much each asks for, by the CPU's twin.
+//!
+//! `LINKLIGHT_BENCH_SCENE` names another scene than the church, `LINKLIGHT_BENCH_ATLAS` another atlas than 128 texels a side;
+//! `LINKLIGHT_BENCH_QUERIES` set to anything leaves the gathers out.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
@@ -11,6 +15,7 @@ use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::gpu::shaders::surface_maps::{CubeRays, CubeRaysParams};
 use linklight::gpu::shaders::types::{Hit, Ray, SurfaceMapQuery};
+use linklight::gpu::shaders::yardstick::{Fetches, FetchesParams};
 use linklight::gpu::{Buffer, Context, Options, Recorder};
 use linklight::methods::surface_shadow_maps::{Lit, Settings, Stage, SurfaceShadowMaps, TexelVisibility};
 use linklight::report::tonemap::ToneSettings;
@@ -21,14 +26,17 @@ use linklight::scene::pose::Pose;
 use linklight::scene::{LoadOptions, builtin, deform};
 use linklight::stages::bvh::Bvh;
 use linklight::stages::film::Film;
-use linklight::stages::surface_maps::{MapFilter, MapInput, MapOptions, PlacedMaps, SurfaceMaps};
+use linklight::stages::surface_maps::{Fetch, MapFilter, MapInput, MapOptions, PackedRuns, PlacedMaps, SurfaceMaps};
 use linklight::stages::trace::{self, Tracer};
 use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
+use std::collections::HashSet;
 use std::hint::black_box;
 use std::time::Instant;
 
 const QUERIES: usize = 1 << 19;
+/// Pairs that stay in a core's own caches.
+const FEW: usize = 64;
 const SIZE: UVec2 = UVec2::new(160, 90);
 
 /// Shortest of `rounds` submissions, seconds; the first of all compiles.
@@ -83,6 +91,9 @@ fn surface_maps(criterion: &mut Criterion) {
     println!("  {bytes:.0} bytes a texel at 6 x {0} x {0}", maps.options.resolution);
 
     queries(&context, criterion, &method, maps, &tracer);
+    if std::env::var_os("LINKLIGHT_BENCH_QUERIES").is_some() {
+        return;
+    }
     gathers(&context, &method, &stage, &bvh, &pose);
 }
 
@@ -165,16 +176,23 @@ fn queries(
         }
     }
     let count = asked.len();
+    let few: Vec<SurfaceMapQuery> = (0..count).map(|i| asked[i % FEW]).collect();
+    let few = context.upload("bench/few queries", &few).unwrap();
+    let places: Vec<u32> = asked.iter().map(|query| query.place).collect();
     let asked = context.upload("bench/queries", &asked).unwrap();
     let rays = context.upload("bench/rays", &rays).unwrap();
     let (seen, free) = (context.buffer("bench/seen", count).unwrap(), context.buffer("bench/free", count).unwrap());
     let by_rays = seconds(context, 5, |recorder| trace::any_hit(recorder, tracer, &rays, &free, count));
+    let by_few = seconds(context, 5, |recorder| maps.query(recorder, &few, &seen, count, MapFilter::None));
+    let million = |seconds: f64| count as f64 / seconds / 1e6;
+    println!("  from the caches ({FEW} pairs over and over), filter None: {:.2} M look-ups/s", million(by_few));
+    waiting(context, maps, &places);
     for filter in [MapFilter::None, MapFilter::Drawn, MapFilter::Four] {
         let by_maps = seconds(context, 5, |recorder| maps.query(recorder, &asked, &seen, count, filter));
         println!(
             "  {count} pairs, filter {filter:?}: {:.2} M look-ups/s, {:.2} M shadow rays/s: {:.1} x",
-            count as f64 / by_maps / 1e6,
-            count as f64 / by_rays / 1e6,
+            million(by_maps),
+            million(by_rays),
             by_rays / by_maps
         );
     }
@@ -190,6 +208,64 @@ fn queries(
             black_box(());
         });
     });
+}
+
+/// What look-ups through random pixels of the maps at `places` fetch, and how long as many bare fetches take.
+fn waiting(context: &Context, maps: &SurfaceMaps, places: &[u32]) {
+    let packed = PackedRuns::of(&maps.maps, maps.layout());
+    let pixels = maps.maps.pixel_count() as u32;
+    let (mut fetches, mut lines, mut pages) = (0usize, 0usize, 0usize);
+    let mut all_lines = HashSet::new();
+    for (k, &place) in places.iter().enumerate() {
+        let pixel = (k as u32).wrapping_mul(2_654_435_761) % pixels;
+        let mut texels = Vec::new();
+        packed.depth(place, pixel as usize, |fetch| {
+            texels.push(match fetch {
+                Fetch::Offsets(texel) => (0, texel),
+                Fetch::Words(texel) => (1, texel),
+            });
+        });
+        let distinct = |texels_each: u32| -> HashSet<(u32, u32)> {
+            texels.iter().map(|&(table, texel)| (table, texel / texels_each)).collect()
+        };
+        fetches += texels.len();
+        // Of 64 bytes, and of 4096.
+        lines += distinct(4).len();
+        pages += distinct(256).len();
+        all_lines.extend(distinct(4));
+    }
+    let each = |sum: usize| sum as f64 / places.len() as f64;
+    println!(
+        "  a look-up in {:?} runs fetches {:.2} texels one after the other, of {:.2} cache lines in {:.2} pages; {} lines of {} in all",
+        maps.layout(),
+        each(fetches),
+        each(lines),
+        each(pages),
+        all_lines.len(),
+        maps.size_bytes() / 64
+    );
+    let texels = (maps.size_bytes() / 16) as u32;
+    let mut next: Vec<[u32; 4]> = (0..texels).map(|texel| [texel, 0, 0, 0]).collect();
+    let mut state = 7u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    for texel in (1..next.len()).rev() {
+        let other = random(texel + 1);
+        next.swap(texel, other);
+    }
+    let starts: Vec<u32> = places.iter().map(|_| random(next.len()) as u32).collect();
+    let table = context.texel_buffer("bench/table", next.len()).unwrap();
+    context.write(table.buffer(), &next).unwrap();
+    let places = context.upload("bench/places", &starts).unwrap();
+    for fetches in 1..=5 {
+        let params = FetchesParams { count: starts.len() as u32, fetches };
+        let pass = Fetches { table: &table, places: &places, params };
+        let bare = seconds(context, 5, |recorder| recorder.dispatch(&pass, starts.len()));
+        let rate = starts.len() as f64 / bare / 1e6;
+        println!("  {fetches} bare fetches in a row over as many bytes: {rate:.2} M/s");
+    }
 }
 
 /// Bounces over texels and the gather of a picture, by maps and by rays, beside the paper's Table 1 in all: a frame of texels

@@ -3,8 +3,9 @@
 // Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
 //
 // Bridges: the kernel binds the runs of all pixels, as texels of four words.
-//     uvec4 surface_offset_texel(uint i)     where the runs of three of the pixels' blocks start, and where the last ends
-//     uvec4 surface_run_texel(uint i)        depths, two a word; from firsts_at where runs start in their blocks
+//     uvec4 surface_offset_texel(uint i)     marked: 96 bits, set where a run starts, and the number of the first of these runs;
+//                                            else where the runs of three of the pixels' blocks start, and where the last ends
+//     uvec4 surface_run_texel(uint i)        depths, two a word; from firsts_at where runs start in their blocks, if not marked
 #include "lib/cube_map.glsl"
 #include "lib/random.glsl"
 
@@ -16,7 +17,7 @@ struct SurfaceMapFrame {
     float codes_per_metre;
     uint filter_mode;       // 0: the pixel itself, 1: one of four around, drawn by its share, 2: all four
     uint sender_filter;     // of the sender's texel and those beside it: 0, 1, 2 likewise
-    uint block_bits;        // places of a block are 2 to this, 8 or 16
+    uint block_bits;        // places of a block are 2 to this, 8 or 16; 0: 96, marked
     uint block_count;
     uint firsts_at;         // texels before those that tell where runs start
     float near_share;       // of a point's distance: what is closer before it than that does not count; a ray looks there
@@ -30,9 +31,20 @@ struct MapView {
 
 uint word_of(uvec4 texel, uint k) { return k < 2 ? (k == 0 ? texel.x : texel.y) : (k == 2 ? texel.z : texel.w); }
 
-// The depth at a place of the sequence: of the last run of its block that starts at it or before. Sought first among
-// texels of 16 (or 8) runs, then within one: a fetch costs more than the four steps that it saves.
-uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
+// The run that holds at a place of the sequence, by the marks: as many start at it or before as bits are set up to it.
+uint marked_run(SurfaceMapFrame frame, uint place, uint pixel)
+{
+    uint block = place / 96u, within = place - 96u * block;
+    uvec4 marks = surface_offset_texel(pixel * frame.block_count + block);
+    uvec3 upto = uvec3(within, max(within, 32u) - 32, max(within, 64u) - 64);
+    uvec3 set = marks.xyz & uvec3(0xffffffffu) >> 31 - min(upto, 31u);
+    ivec3 counts = bitCount(set);
+    return marks.w + counts.x + (within < 32 ? 0 : counts.y) + (within < 64 ? 0 : counts.z) - 1;
+}
+
+// The same by search for the last run of the place's block that starts at it or before: first among texels of 16 (or 8)
+// runs, then within one. A fetch costs more than the four steps that it saves.
+uint searched_run(SurfaceMapFrame frame, uint place, uint pixel)
 {
     uint bits = frame.block_bits, mask = (1u << bits) - 1, shift = bits == 8 ? 4 : 3;
     uint block = pixel * frame.block_count + (place >> bits), within = place & mask;
@@ -55,7 +67,13 @@ uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
         low = starts ? middle : low;
         high = starts ? high : middle;
     }
-    return word_of(surface_run_texel(low >> 3), low >> 1 & 3) >> 16 * (low & 1) & 0xffffu;
+    return low;
+}
+
+uint surface_map_depth(SurfaceMapFrame frame, uint place, uint pixel)
+{
+    uint run = frame.block_bits == 0 ? marked_run(frame, place, pixel) : searched_run(frame, place, pixel);
+    return word_of(surface_run_texel(run >> 3), run >> 1 & 3) >> 16 * (run & 1) & 0xffffu;
 }
 
 // Maps that rays look after within so many widths of a pixel of the point: there a map cannot tell what lies before an edge

@@ -6,7 +6,7 @@ use glam::Vec3;
 use linklight::gpu::shaders::display::{ShadowMap, ShadowMapParams};
 use linklight::gpu::shaders::scan::{AddBlockSums, AddBlockSumsParams};
 use linklight::gpu::shaders::types::ShadowView;
-use linklight::gpu::shaders::yardstick::{MultiplyAdd, MultiplyAddParams};
+use linklight::gpu::shaders::yardstick::{Fetches, FetchesParams, MultiplyAdd, MultiplyAddParams};
 use linklight::gpu::{
     Buffer, Context, Format, Image, ImageDescription, Load, OptionalFeatures, Options, RasterState, Shape, Target,
 };
@@ -99,6 +99,27 @@ fn a_pass_behind_a_draw_is_timed_whole() {
     let [before, behind] = [false, true].map(shortest);
     println!("before any draw {before} ns, behind one {behind} ns");
     assert!(behind > before / 4 && before > behind / 4, "{before} ns and {behind} ns");
+}
+
+/// The bench's floor of look-ups fetches what it says, in a row.
+#[test]
+fn chains_of_fetches_go_where_they_are_told() {
+    let context = TestContext::new();
+    let random = &mut Random(3);
+    let next: Vec<[u32; 4]> = (0..500).map(|_| [random.below(500), 0, 0, 0]).collect();
+    let starts: Vec<u32> = (0..100).map(|_| random.below(500)).collect();
+    let table = context.texel_buffer("test/table", next.len()).unwrap();
+    context.write(table.buffer(), &next).unwrap();
+    for fetches in 0..4 {
+        let places = context.upload("test/places", &starts).unwrap();
+        let params = FetchesParams { count: 100, fetches };
+        let mut recorder = context.recorder("test").unwrap();
+        recorder.dispatch(&Fetches { table: &table, places: &places, params }, places.len());
+        recorder.submit().unwrap();
+        let expected: Vec<u32> =
+            starts.iter().map(|&start| (0..fetches).fold(start, |at, _| next[at as usize][0])).collect();
+        assert_eq!(context.download(&places).unwrap(), expected);
+    }
 }
 
 #[test]

@@ -8,7 +8,8 @@ use linklight::gpu::shaders::types::SurfaceMapQuery;
 use linklight::scene::Material;
 use linklight::scene::environment::Environment;
 use linklight::stages::surface_maps::{
-    Interval, MapFilter, MapOptions, MapUntil, Sequence, SurfaceMapError, SurfaceMaps, sequence, uncompressed,
+    Interval, MapFilter, MapOptions, MapUntil, RunLayout, Sequence, SurfaceMapError, SurfaceMaps, sequence,
+    uncompressed,
 };
 use linklight::stages::work::{Interrupted, Unwatched, Watch};
 
@@ -112,10 +113,12 @@ fn queries_on_the_device_agree_with_the_intervals() {
     let pixels = maps.maps.pixel_count() as u32;
     let all = (0..order.len() as u32).flat_map(|place| (0..pixels).map(move |pixel| (place, pixel)));
     let asked = Asked::new(&context, &maps, &intervals, all);
-    for (filter, block_bits) in [(MapFilter::None, 16), (MapFilter::Four, 16), (MapFilter::None, 8)] {
-        maps.repack(&context, block_bits).unwrap();
+    for layout in RunLayout::ALL {
+        maps.repack(&context, layout).unwrap();
         // At the middle of a pixel no other counts.
-        assert_eq!(asked.wrong(&context, &maps, filter), 0);
+        for filter in [MapFilter::None, MapFilter::Four] {
+            assert_eq!(asked.wrong(&context, &maps, filter), 0, "{layout:?}");
+        }
     }
     let mut spoilt = asked;
     spoilt.queries.iter_mut().for_each(|query| query.place = (query.place + 40) % order.len() as u32);
@@ -131,14 +134,17 @@ fn queries_of_a_large_scene_agree_with_the_intervals() {
     let options = options(6, Sequence::Spiral);
     let order = sequence::walk(&atlas, Sequence::Spiral);
     let input = fixture.map_input(&atlas, None);
-    let maps = SurfaceMaps::new(&context, input, options, &Unwatched).unwrap();
+    let mut maps = SurfaceMaps::new(&context, input, options, &Unwatched).unwrap();
     let intervals = uncompressed(&context, input, options, &order, &Unwatched).unwrap();
     assert!(order.len() > 5000 && first_wrong(&maps, &intervals).is_none());
     let random = &mut Random(17);
     let pixels = maps.maps.pixel_count() as u32;
     let some = std::iter::repeat_with(|| (random.below(order.len() as u32), random.below(pixels)));
     let asked = Asked::new(&context, &maps, &intervals, some.take(40_000));
-    assert_eq!(asked.wrong(&context, &maps, MapFilter::None), 0);
+    for layout in RunLayout::ALL {
+        maps.repack(&context, layout).unwrap();
+        assert_eq!(asked.wrong(&context, &maps, MapFilter::None), 0, "{layout:?}");
+    }
 }
 
 /// Drawn filtering is the filter over all four pixels in the mean.

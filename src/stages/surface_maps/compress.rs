@@ -156,91 +156,11 @@ impl CompressedMaps {
     }
 }
 
-/// Runs as shaders read them: of each pixel and each block of places its own, so that where a run starts takes the bits of
-/// a place within a block alone.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PackedRuns {
-    /// Places of a block are 2 to this; 8 or 16.
-    pub block_bits: u32,
-    pub block_count: u32,
-    /// Where the runs of each pixel's blocks start, pixel after pixel: three of them and the end of the third in each four
-    /// words, so that one fetch tells where those of a block start and end.
-    pub offsets: Vec<u32>,
-    /// Depths, two a word; from `firsts_at`, a multiple of four, where in its block each run starts, four or two a word.
-    pub words: Vec<u32>,
-    pub firsts_at: u32,
-}
-
-impl PackedRuns {
-    /// In large blocks, or in small ones where many short runs make those smaller.
-    pub fn smallest(maps: &CompressedMaps) -> Self {
-        let [small, large] = [8, 16].map(|block_bits| Self::of(maps, block_bits));
-        if small.size_bytes() < large.size_bytes() { small } else { large }
-    }
-
-    /// In blocks of 256 or 65536 places; a run that goes on in the next block starts there anew.
-    pub fn of(maps: &CompressedMaps, block_bits: u32) -> Self {
-        let block_count = maps.place_count.div_ceil(1 << block_bits).max(1);
-        let (mut offsets, mut depths, mut firsts) = (vec![0], Vec::new(), Vec::new());
-        for pixel in maps.offsets.windows(2) {
-            let runs = &maps.runs[pixel[0] as usize..pixel[1] as usize];
-            let mut next = 0;
-            for block in 0..block_count {
-                let start = block << block_bits;
-                if next > 0 && runs.get(next).is_none_or(|run| u32::from(run.first) > start) {
-                    depths.push(runs[next - 1].depth);
-                    firsts.push(0);
-                }
-                while let Some(run) = runs.get(next).filter(|run| u32::from(run.first) >> block_bits == block) {
-                    depths.push(run.depth);
-                    firsts.push((u32::from(run.first) - start) as u16);
-                    next += 1;
-                }
-                offsets.push(depths.len() as u32);
-            }
-        }
-        let blocks = offsets.len() - 1;
-        let fours = (0..blocks).step_by(3).flat_map(|block| (block..block + 4).map(|start| start.min(blocks)));
-        let offsets = fours.map(|start| offsets[start]).collect();
-        let mut words: Vec<u32> = depths.chunks(2).map(|pair| pack(pair, 16)).collect();
-        words.resize(words.len().next_multiple_of(4), 0);
-        let firsts_at = words.len() as u32;
-        words.extend(firsts.chunks(32 / block_bits as usize).map(|firsts| pack(firsts, block_bits)));
-        Self { block_bits, block_count, offsets, words, firsts_at }
-    }
-
-    pub fn size_bytes(&self) -> u64 {
-        ((self.offsets.len() + self.words.len()) * size_of::<u32>()) as u64
-    }
-
-    /// As shaders look it up.
-    #[cfg(test)]
-    fn depth(&self, place: u32, pixel: usize) -> u16 {
-        let at = pixel * self.block_count as usize + (place >> self.block_bits) as usize;
-        let starts_at = &self.offsets[at / 3 * 4..][..4];
-        let (mut low, mut high) = (starts_at[at % 3], starts_at[at % 3 + 1]);
-        let per_word = 32 / self.block_bits;
-        let first = |run: u32| {
-            let word = self.words[(self.firsts_at + run / per_word) as usize];
-            word >> (run % per_word * self.block_bits) & ((1 << self.block_bits) - 1)
-        };
-        while high - low > 1 {
-            let middle = (low + high) / 2;
-            if first(middle) <= place & ((1 << self.block_bits) - 1) { low = middle } else { high = middle }
-        }
-        (self.words[low as usize / 2] >> (16 * (low % 2))) as u16
-    }
-}
-
-fn pack(values: &[u16], bits: u32) -> u32 {
-    values.iter().rev().fold(0, |word, &value| word << (bits % 32) | u32::from(value))
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn signal(seed: u32, length: usize) -> Vec<Interval> {
+    pub fn signal(seed: u32, length: usize) -> Vec<Interval> {
         let hash = |i: u32| {
             let x = (i ^ seed.wrapping_mul(0x9e37_79b9)).wrapping_mul(0x85eb_ca6b);
             (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35) >> 16
@@ -290,33 +210,6 @@ mod tests {
             let holds =
                 signal.iter().enumerate().all(|(place, interval)| interval.contains(wrong.depth(place as u32, 0)));
             assert_eq!(holds, signal.iter().all(|&interval| interval == Interval::ANY));
-        }
-    }
-
-    #[test]
-    fn packed_runs_hold_the_same_depths() {
-        for (length, count) in [(1, 1), (255, 2), (256, 3), (257, 2), (1000, 4)] {
-            let signals: Vec<Vec<Interval>> = (0..count).map(|pixel| signal(pixel + 70, length)).collect();
-            let mut compressor = Compressor::new(count as usize, None);
-            for place in 0..length {
-                compressor.push(&signals.iter().map(|signal| signal[place]).collect::<Vec<_>>());
-            }
-            let maps = compressor.finish();
-            for block_bits in [8, 16] {
-                let packed = PackedRuns::of(&maps, block_bits);
-                for pixel in 0..count as usize {
-                    for place in 0..length as u32 {
-                        assert_eq!(packed.depth(place, pixel), maps.depth(place, pixel), "{block_bits} bits, {place}");
-                    }
-                }
-                let mut spoilt = packed.clone();
-                spoilt.words[0] ^= 0x40;
-                assert_ne!(spoilt.depth(0, 0), maps.depth(0, 0));
-            }
-            let smallest = PackedRuns::smallest(&maps).size_bytes();
-            // Each third start stands twice; fours and words are filled up.
-            let twice = 4 * maps.offsets.len() as u64 / 3;
-            assert!(smallest <= maps.size_bytes() + twice + 28, "{smallest} bytes for {}", maps.size_bytes());
         }
     }
 

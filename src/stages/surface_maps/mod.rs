@@ -20,14 +20,16 @@
 pub mod cache;
 mod compress;
 mod outside;
+mod packed;
 mod placed;
 pub mod sequence;
 mod sharing;
 mod sight;
 
 pub use cache::{Found, Key};
-pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, PackedRuns, Run};
+pub use compress::{CompressedMaps, Compressor, Interval, MAX_PLACES, Run};
 pub use outside::{Ball, MovingMaps, MovingTables, texel_objects};
+pub use packed::{Fetch, PackedRuns, RunLayout};
 pub use placed::PlacedMaps;
 pub use sequence::Sequence;
 pub use sharing::Sharing;
@@ -39,6 +41,7 @@ use crate::gpu::shaders::types::{Hit, Ray, SurfaceMapFrame, SurfaceMapQuery};
 use crate::gpu::{Buffer, Context, GpuError, Recorder, TexelBuffer};
 use crate::scene::atlas::Atlas;
 use glam::Vec3;
+use packed::Packing;
 use std::ops::Range;
 use std::path::Path;
 
@@ -113,20 +116,6 @@ pub struct SurfaceMaps {
     pub codes_per_metre: f32,
     /// Rays that were cast; 0 when read from disk.
     pub ray_count: u64,
-}
-
-/// Of [`PackedRuns`], what is not in their tables.
-struct Packing {
-    block_bits: u32,
-    block_count: u32,
-    /// Texels.
-    firsts_at: u32,
-}
-
-impl Packing {
-    fn of(packed: &PackedRuns) -> Self {
-        Self { block_bits: packed.block_bits, block_count: packed.block_count, firsts_at: packed.firsts_at / 4 }
-    }
 }
 
 /// What maps are made of.
@@ -208,7 +197,7 @@ impl SurfaceMaps {
                 maps
             }
         };
-        let packed = PackedRuns::smallest(&maps);
+        let packed = PackedRuns::best(&maps);
         Ok(Self {
             options,
             places,
@@ -233,9 +222,14 @@ impl SurfaceMaps {
         plain as f64 / self.size_bytes() as f64
     }
 
-    /// The same maps in blocks of 256 places (8) or of 65536 (16).
-    pub fn repack(&mut self, context: &Context, block_bits: u32) -> Result<(), GpuError> {
-        let packed = PackedRuns::of(&self.maps, block_bits);
+    /// How the runs lie on the device.
+    pub fn layout(&self) -> RunLayout {
+        self.packing.layout
+    }
+
+    /// The same maps laid out otherwise.
+    pub fn repack(&mut self, context: &Context, layout: RunLayout) -> Result<(), GpuError> {
+        let packed = PackedRuns::of(&self.maps, layout);
         self.run_offsets = texels(context, "surface_maps/run offsets", &packed.offsets)?;
         self.runs = texels(context, "surface_maps/runs", &packed.words)?;
         self.packing = Packing::of(&packed);
@@ -254,7 +248,7 @@ impl SurfaceMaps {
             codes_per_metre: self.codes_per_metre,
             filter_mode: code(filter),
             sender_filter: code(sender_filter),
-            block_bits: self.packing.block_bits,
+            block_bits: self.packing.layout.block_bits(),
             block_count: self.packing.block_count,
             firsts_at: self.packing.firsts_at,
             near_share: 0.0,
