@@ -27,7 +27,7 @@ pub struct Grown {
     pub normals: Vec<Vec<Vec3>>,
     /// Per element and node: it is no matter of rounding.
     pub is_clear: Vec<Vec<bool>>,
-    /// Per element, function and receiver node.
+    /// Per element: of each function and receiver node, then of each shooter node.
     pub fits: Vec<f32>,
     /// Per element and function.
     pub means: Vec<f32>,
@@ -102,7 +102,7 @@ fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) ->
     let (mut fits, mut means) = (Vec::new(), Vec::new());
     for (e, laid) in elements.iter().zip(&laid) {
         let (rows, of_functions) = twins::fit(&tables, e, &laid.places, FUNCTIONS);
-        fits.extend(rows.iter().flatten().map(|&v| v as f32));
+        fits.extend(rows.iter().flatten().chain(&twins::weights(&tables, e, &laid.places)).map(|&v| v as f32));
         means.extend(of_functions.iter().map(|&v| v as f32));
     }
     let is_clear = laid.iter().map(|laid| laid.is_clear.clone()).collect();

@@ -2,7 +2,7 @@
 
 use crate::common::Random;
 use crate::grown::{
-    FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, SHOOTER, as_words, check, flat, grown, random_vectors, vectors,
+    FUNCTIONS, Grown, RADIOSITY_FUNCTIONS, RECEIVER, SHOOTER, as_words, check, flat, grown, random_vectors, vectors,
 };
 use crate::pair_twins::{self, IN_SHADOW};
 use crate::twins::{self, NONE, Vectors};
@@ -92,13 +92,7 @@ fn what_is_hidden_is_no_surface() {
     let mut counts = [0; 3];
     for (e, nodes) in g.elements.iter().zip(&g.nodes) {
         let share = e.area / all(e);
-        let kind = if share > 0.99 {
-            0
-        } else if share > 0.05 {
-            1
-        } else {
-            2
-        };
+        let kind = usize::from(share <= 0.99) + usize::from(share <= 0.05);
         counts[kind] += 1;
         assert!(kind == 2 || !nodes.iter().any(is_inside), "{nodes:?}, share {share}");
     }
@@ -118,6 +112,7 @@ fn roots_and_children_are_made() {
     let function_means = g.table(&vec![0f32; g.means.len()]);
     let (receiver_nodes, shooter_nodes) = (g.tables.receiver_nodes as u32, SHOOTER.nodes().len() as u32);
     let (irradiance_functions, ray_offset) = (FUNCTIONS as u32, g.tables.ray_offset);
+    let (laid_functions, sent_functions) = (RECEIVER.functions(), SHOOTER.functions());
     // The children's claims are there, as `grow` leaves them.
     let claimed: Vec<FaceElement> = g
         .elements
@@ -151,7 +146,13 @@ fn roots_and_children_are_made() {
             bvh_triangles: g.fixture.bvh.triangles(),
             solids: &p.solids,
             params: passes::MakeRootsParams { instance_count: roots as u32, ray_offset },
-            constants: passes::MakeRootsConstants { receiver_nodes, shooter_nodes, irradiance_functions },
+            constants: passes::MakeRootsConstants {
+                receiver_nodes,
+                shooter_nodes,
+                irradiance_functions,
+                laid_functions,
+                sent_functions,
+            },
         },
         roots,
     );
@@ -188,7 +189,13 @@ fn roots_and_children_are_made() {
                 solids: &p.solids,
                 counters: &counters,
                 params: passes::MakeChildrenParams { capacity: g.elements.len() as u32, ray_offset },
-                constants: passes::MakeChildrenConstants { receiver_nodes, shooter_nodes, irradiance_functions },
+                constants: passes::MakeChildrenConstants {
+                    receiver_nodes,
+                    shooter_nodes,
+                    irradiance_functions,
+                    laid_functions,
+                    sent_functions,
+                },
             },
             64u32,
         );

@@ -1,6 +1,6 @@
 //! Twins of what decides pairs: visibility, transport, bounds and splits.
 
-use crate::twins::{Tables, Vectors, basis, fit, is_flat, node_coordinates, vector_area};
+use crate::twins::{self, Tables, Vectors, basis, fit, is_flat, node_coordinates, vector_area};
 use crate::way_twins::{Blockers, Ends, Shares, free_ways, shares_of, visibility};
 use glam::{DVec3, Vec3};
 use linklight::gpu::shaders::types::{FaceElement, Light};
@@ -272,8 +272,8 @@ pub fn transport(
     if !may_face(a, b) || !may_face(b, a) {
         return Outcome::new(DONE, vec![]);
     }
-    let shooter_rule = &t.rules_of(b)[t.receiver_nodes..];
-    let sent: Vec<DVec3> = (0..shooter_rule.len())
+    let weights = twins::weights(t, b, &nodes[shooter]);
+    let sent: Vec<DVec3> = (0..weights.len())
         .map(|e| {
             let uv = node_coordinates(t, b, &nodes[shooter], t.receiver_nodes + e);
             let value = |(k, v): (usize, &Vec3)| basis(k, uv) * v.as_dvec3();
@@ -300,14 +300,14 @@ pub fn transport(
         is_far &= away > 2.0;
         let (mut vectors, mut sum, mut passed) = ([DVec3::ZERO; 3], 0.0, DVec3::ZERO);
         let (mut low, mut high, mut sends) = (f64::INFINITY, near_power.max(around), false);
-        for (e, rule) in shooter_rule.iter().enumerate() {
+        for (e, weight) in weights.iter().enumerate() {
             let d = nodes[shooter][t.receiver_nodes + e].as_dvec3() - x;
             let squared = d.length_squared().max(1e-20);
             let direction = d / squared.sqrt();
             let scale = sent[e].max_element() / (PI * squared);
             low = low.min(scale * least_area(b, -direction) * least_area(a, direction));
             high = high.max(scale * most_area(b, -direction) * most_area(a, direction));
-            let share = f64::from(rule.weight) * projected_area(b, -direction) / (PI * squared);
+            let share = weight * projected_area(b, -direction) / (PI * squared);
             let kept = share * kept_vector(t, a, direction);
             sends |= share > 0.0;
             sum += kept.length();
@@ -333,7 +333,7 @@ pub fn transport(
     let strongest = unshot[shooter][0];
     let channel = (0..3).find(|&c| strongest[c] == strongest.max_element()).unwrap();
     let reaching = Reaching { at_nodes, least, greatest, channel, shadow };
-    let (shooters, receivers) = (shooter_rule.len(), t.receiver_nodes);
+    let (shooters, receivers) = (weights.len(), t.receiver_nodes);
     let at = |e: usize, k: usize| (nodes[e][k].as_dvec3(), normals[e][k].as_dvec3());
     let ends = Ends {
         elements: [a, b],

@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 use linklight::gpu::shaders::types::{ClusterInstance, CubatureNode, FaceCluster, FaceElement};
 use linklight::stages::clusters::{face_count, hollowness, measure::decode_color};
+use std::ops::Range;
 
 pub const NONE: u32 = u32::MAX;
 
@@ -241,23 +242,10 @@ pub fn is_flat(e: &FaceElement) -> bool {
     e.place_count == 1 || vector_area(e) > 0.99 * f64::from(e.area)
 }
 
-/// `fit_functions`: a row a function, a column a receiver node; and the functions' means. By Gauss and Jordan.
-pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
-    let at: Vec<Vec<f64>> = (0..t.receiver_nodes)
-        .map(|r| node_coordinates(t, e, nodes, r))
-        .map(|uv| (0..functions).map(|k| basis(k, uv)).collect())
-        .collect();
-    let weights: Vec<f64> = t.rules_of(e)[..t.receiver_nodes].iter().map(|rule| f64::from(rule.weight)).collect();
-    let sum = |j: usize, k: usize| -> f64 { at.iter().zip(&weights).map(|(b, w)| w * b[j] * b[k]).sum() };
-    let fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
-    let mut rows: Vec<Vec<f64>> = (0..functions)
-        .map(|j| {
-            let ridge = if j < 3 || fills { 1e-3 } else { 0.1 };
-            let squares = (0..functions).map(|k| sum(j, k) + if j == k { ridge } else { 0.0 });
-            squares.chain(at.iter().zip(&weights).map(|(b, w)| w * b[j])).collect()
-        })
-        .collect();
-    for j in 0..functions {
+/// Solves for all columns beyond the first as many as there are rows. By Gauss and Jordan.
+fn solved(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let count = rows.len();
+    for j in 0..count {
         let pivot = rows[j][j];
         rows[j].iter_mut().for_each(|v| *v /= pivot);
         let own = rows[j].clone();
@@ -266,13 +254,84 @@ pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Ve
             row.iter_mut().zip(&own).for_each(|(v, o)| *v -= factor * o);
         }
     }
-    let mut rows: Vec<Vec<f64>> = rows.into_iter().map(|row| row[functions..].to_vec()).collect();
-    let means: Vec<f64> = (0..functions).map(|j| sum(j, 0)).collect();
-    for r in 0..t.receiver_nodes {
-        let said: f64 = (0..functions).map(|k| means[k] * rows[k][r]).sum();
-        rows[0][r] += weights[r] - said;
+    rows.into_iter().map(|row| row[count..].to_vec()).collect()
+}
+
+/// Means of products of two functions over flat faces, or over 64 of them.
+fn products_over_faces(t: &Tables, e: &FaceElement, functions: usize) -> Vec<Vec<f64>> {
+    let (inst, all, taken) = (&t.instances[e.instance as usize], e.place_count, e.place_count.min(64));
+    let half = t.rules.len() / 2;
+    let (mut sums, mut area) = (vec![vec![0.0; functions]; functions], 0.0);
+    for f in 0..taken {
+        let face = e.first_place - inst.first_triangle + (2 * f + 1) * all / (2 * taken);
+        let [a, b, c] = t.corners(t.triangle_at(inst, face));
+        let size = (b - a).cross(c - a).length();
+        area += size;
+        for node in &t.rules[half..half + t.receiver_nodes] {
+            let (u, v) = (f64::from(node.uv.x), f64::from(node.uv.y));
+            let uv = plane_coordinates(e, a * (1.0 - u - v) + b * u + c * v);
+            for (j, row) in sums.iter_mut().enumerate() {
+                let value = |k: usize| size * f64::from(node.weight) * basis(j, uv) * basis(k, uv);
+                row.iter_mut().enumerate().for_each(|(k, sum)| *sum += value(k));
+            }
+        }
     }
-    (rows, means)
+    sums.iter_mut().flatten().for_each(|sum| *sum /= area);
+    sums
+}
+
+/// `fit_functions` of some nodes: what is laid through them by least squares, projected on so many functions over the faces:
+/// a row a function, a column a node; and the functions' means.
+fn fit_of(
+    t: &Tables,
+    e: &FaceElement,
+    nodes: &[Vec3],
+    (of, higher): (Range<usize>, f64),
+    functions: usize,
+) -> (Vec<Vec<f64>>, Vec<f64>) {
+    let laid = [(16, 10), (6, 6), (4, 3), (1, 1)].into_iter().find(|(nodes, _)| of.len() >= *nodes).unwrap().1;
+    let at: Vec<Vec<f64>> = of
+        .clone()
+        .map(|k| node_coordinates(t, e, nodes, k))
+        .map(|uv| (0..laid).map(|k| basis(k, uv)).collect())
+        .collect();
+    let weights: Vec<f64> = t.rules_of(e)[of].iter().map(|rule| f64::from(rule.weight)).collect();
+    let sum = |j: usize, k: usize| -> f64 { at.iter().zip(&weights).map(|(b, w)| w * b[j] * b[k]).sum() };
+    let at_nodes: Vec<Vec<f64>> = (0..laid).map(|j| (0..laid).map(|k| sum(j, k)).collect()).collect();
+    let fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
+    let scale = t.instances[e.instance as usize].scale;
+    let is_whole = e.area > 0.9999 * t.clusters[e.cluster as usize].area * scale * scale;
+    let by_faces = !fills && is_whole && e.place_count > 1;
+    let products = if by_faces { products_over_faces(t, e, laid) } else { at_nodes.clone() };
+    let ridge = |j: usize| {
+        if j == 0 {
+            0.0
+        } else if j < 3 || fills {
+            1e-3
+        } else {
+            higher
+        }
+    };
+    let columns = |j: usize| at.iter().zip(&weights).map(move |(b, w)| w * b[j]);
+    let rows = (0..laid)
+        .map(|j| (0..laid).map(|k| at_nodes[j][k] + if j == k { ridge(j) } else { 0.0 }).chain(columns(j)).collect());
+    let laid_through = solved(rows.collect());
+    let projected = |j: usize, r: usize| -> f64 { (0..laid).map(|k| products[j][k] * laid_through[k][r]).sum() };
+    let rows = (0..functions).map(|j| {
+        let own = (0..functions).map(|k| products[j][k] + if j == k && j > 0 { 1e-5 } else { 0.0 });
+        own.chain((0..at.len()).map(|r| projected(j, r))).collect()
+    });
+    (solved(rows.collect()), products[0][..functions].to_vec())
+}
+
+/// `fit_functions` of the receiver's nodes.
+pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
+    fit_of(t, e, nodes, (0..t.receiver_nodes, 0.1), functions)
+}
+
+/// `fit_functions` of the shooter's nodes: what each is of all.
+pub fn weights(t: &Tables, e: &FaceElement, nodes: &[Vec3]) -> Vec<f64> {
+    fit_of(t, e, nodes, (t.receiver_nodes..nodes.len(), 0.01), 1).0.remove(0)
 }
 
 /// Elements without what is hidden of them, and what they send themselves.

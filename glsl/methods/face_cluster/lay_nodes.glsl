@@ -1,17 +1,13 @@
 #ifndef FACE_CLUSTER_LAY_NODES
 #define FACE_CLUSTER_LAY_NODES
-// Where an element's cubature nodes stand: on its faces, where these are not hidden inside other bodies; and how what
-// arrives there makes its functions. Included where the tables of make_element are bound.
+// Where an element's cubature nodes stand: on its faces, where these are not hidden inside other bodies. Included where
+// the tables of make_element are bound.
 #include "methods/face_cluster/hidden.glsl"
 
 // Places that are looked at for a node.
 const uint TRIES = 8;
 // Share of an element's area that is not hidden, at least: what its nodes miss.
 const float LEAST_EXPOSED = 1.0 / 32.0;
-// Added to the squares of functions, so that nodes that stand in a row, or at one place, say no more than they can.
-const float RIDGE = 1e-3;
-// Of those that are not linear, on flat faces that do not fill their square.
-const float HIGHER_RIDGE = 0.1;
 
 // The nearest point of a triangle.                                                             [Ericson2004 5.1.5]
 vec3 nearest_of_triangle(vec3 p, vec3 a, vec3 b, vec3 c)
@@ -134,61 +130,5 @@ float self_form_factor(float area)
             sum += min(facing * area / (PI * squared * squared), float(RULE_NODES));
         }
     return 2.0 * sum / float(RULE_NODES * (RULE_NODES - 1));
-}
-
-// Where a receiver node counts as standing: a flat element's where it is, others where the rule has them.
-vec2 node_coordinates(uint index, FaceElement e, uint r)
-{
-    return is_flat(e) ? plane_coordinates(e, element_nodes[index * RULE_NODES + r]) : rules[r].uv;
-}
-
-// By how much what arrives at each receiver node makes each function: least squares, with the mean as the nodes say it;
-// and the mean of each function over the element.                                               [Gobbetti2003 Eq. 7]
-// Differs from [Gobbetti2003]: there all surfaces fill their squares, where this is the projection on orthonormal
-// functions; a single face does not.
-void fit_functions(uint index, FaceElement e)
-{
-    const uint N = IRRADIANCE_FUNCTIONS;
-    uint rule = e.place_count == 1 ? RULE_NODES : 0;
-    bool fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
-    float gram[IRRADIANCE_FUNCTIONS * IRRADIANCE_FUNCTIONS], means[IRRADIANCE_FUNCTIONS], column[IRRADIANCE_FUNCTIONS];
-    [[dont_unroll]] for (uint j = 0; j < N; ++j) {
-        means[j] = 0.0;
-        [[dont_unroll]] for (uint k = 0; k < N; ++k) gram[j * N + k] = j != k ? 0.0 : j < 3 || fills ? RIDGE : HIGHER_RIDGE;
-    }
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        vec2 uv = node_coordinates(index, e, r);
-        [[dont_unroll]] for (uint j = 0; j < N; ++j) {
-            float value = rules[rule + r].weight * basis(j, uv);
-            means[j] += value;
-            [[dont_unroll]] for (uint k = 0; k <= j; ++k) gram[j * N + k] += value * basis(k, uv);
-        }
-    }
-    // Cholesky's factor, in place.
-    [[dont_unroll]] for (uint j = 0; j < N; ++j)
-        [[dont_unroll]] for (uint i = j; i < N; ++i) {
-            float sum = gram[i * N + j];
-            [[dont_unroll]] for (uint k = 0; k < j; ++k) sum -= gram[i * N + k] * gram[j * N + k];
-            gram[i * N + j] = i == j ? sqrt(max(sum, 1e-6)) : sum / gram[j * N + j];
-        }
-    [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r) {
-        vec2 uv = node_coordinates(index, e, r);
-        float weight = rules[rule + r].weight, said = 0.0;
-        [[dont_unroll]] for (uint i = 0; i < N; ++i) {
-            float sum = weight * basis(i, uv);
-            [[dont_unroll]] for (uint k = 0; k < i; ++k) sum -= gram[i * N + k] * column[k];
-            column[i] = sum / gram[i * N + i];
-        }
-        [[dont_unroll]] for (uint down = 0; down < N; ++down) {
-            uint i = N - 1 - down;
-            float sum = column[i];
-            [[dont_unroll]] for (uint k = i + 1; k < N; ++k) sum -= gram[k * N + i] * column[k];
-            column[i] = sum / gram[i * N + i];
-            said += means[i] * column[i];
-        }
-        column[0] += weight - said;
-        [[dont_unroll]] for (uint i = 0; i < N; ++i) fits[(index * N + i) * RECEIVER_NODES + r] = column[i];
-    }
-    [[dont_unroll]] for (uint i = 0; i < N; ++i) function_means[index * N + i] = means[i];
 }
 #endif

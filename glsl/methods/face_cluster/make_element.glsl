@@ -16,15 +16,18 @@ layout(set = 0, binding = 6, scalar) readonly buffer Rules { CubatureNode rules[
 layout(set = 0, binding = 7, scalar) buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 8, scalar) buffer Nodes { vec3 element_nodes[]; };                        // per element and rule node, metres
 layout(set = 0, binding = 9, scalar) buffer Pool { PoolCounters pool[]; };
-layout(set = 0, binding = 13, scalar) writeonly buffer Fits { float fits[]; };                      // per element, function and receiver node
+layout(set = 0, binding = 13, scalar) writeonly buffer Fits { float fits[]; };                      // per element: of each function and receiver node, then of each shooter node
 layout(set = 0, binding = 16, scalar) writeonly buffer Normals { uint node_normals[]; };            // per element and rule node: packSnorm4x8
 layout(set = 0, binding = 14, scalar) writeonly buffer FunctionMeans { float function_means[]; };   // per element and function
 layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
 layout(constant_id = 2) const uint IRRADIANCE_FUNCTIONS = 3u;
+layout(constant_id = 3) const uint LAID_FUNCTIONS = 6u;    // through receiver nodes: as many as they can tell
+layout(constant_id = 4) const uint SENT_FUNCTIONS = 6u;    // through shooter nodes
 const uint RULE_NODES = RECEIVER_NODES + SHOOTER_NODES;
 
 #include "methods/face_cluster/lay_nodes.glsl"
+#include "methods/face_cluster/fit_functions.glsl"
 
 // Of the bound on what a cluster that is not convex sends itself, what is expected at least: its nodes may miss it all.
 const float LEAST_SELF_SHARE = 0.02;
@@ -66,7 +69,7 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
     float bound = clamp(1.0 - vector_area(e) / max(e.area, 1e-30), 0.0, 1.0);
     e.self_share = back || hollowness(c) > 0.0 ? clamp(self_form_factor(e.area), LEAST_SELF_SHARE * bound, bound) : 0.0;
     elements[index] = e;
-    fit_functions(index, e);
+    fit_functions(index, e, inst, share == 1.0);
     atomicMax(pool[0].deepest_level, level);
 }
 #endif

@@ -18,7 +18,7 @@ layout(set = 0, binding = 5, scalar) readonly buffer Materials { Material materi
 layout(set = 0, binding = 6, scalar) readonly buffer Places { uint triangle_places[]; };            // per triangle
 layout(set = 0, binding = 7, scalar) readonly buffer Elements { FaceElement elements[]; };
 layout(set = 0, binding = 8, scalar) readonly buffer Nodes { vec3 element_nodes[]; };
-layout(set = 0, binding = 9, scalar) readonly buffer Fits { float fits[]; };                       // per element, function, receiver node
+layout(set = 0, binding = 9, scalar) readonly buffer Fits { float fits[]; };                       // per element: of each function and receiver node, then of each shooter node
 layout(set = 0, binding = 10, scalar) readonly buffer Skips { uint cluster_skips[]; };
 layout(set = 0, binding = 11, scalar) buffer Arriving { int arriving[]; };                          // per element, function, channel, axis
 layout(set = 0, binding = 12, scalar) buffer Pool { PoolCounters pool[]; };
@@ -29,6 +29,7 @@ layout(constant_id = 0) const uint RECEIVER_NODES = 7u;
 layout(constant_id = 1) const uint SHOOTER_NODES = 6u;
 layout(constant_id = 2) const uint IRRADIANCE_FUNCTIONS = 3u;
 const uint RULE_NODES = RECEIVER_NODES + SHOOTER_NODES;
+const uint FITS = IRRADIANCE_FUNCTIONS * RECEIVER_NODES + SHOOTER_NODES;
 layout(constant_id = 3) const bool ALPHA_TEST = false;
 layout(constant_id = 5) const bool CLUSTERS_BLOCK = false;  // multiresolution visibility instead of rays
 
@@ -65,6 +66,9 @@ float visibility(FaceElement receiver, Ray ray)
 }
 
 vec3 receiver_node(uint element, uint k) { return element_nodes[element * RULE_NODES + k]; }
+// What the places around a shooter node are of all of it.
+float shooter_weight(uint element, uint k) { return fits[element * FITS + IRRADIANCE_FUNCTIONS * RECEIVER_NODES + k]; }
+
 vec3 shooter_node(uint element, uint k) { return receiver_node(element, RECEIVER_NODES + k); }
 
 // Of the face that the node lies on.
@@ -99,7 +103,7 @@ void project(uint receiver, mat3 at_nodes[RECEIVER_NODES], out mat3 on_functions
     [[dont_unroll]] for (uint k = 0; k < IRRADIANCE_FUNCTIONS; ++k) {
         on_functions[k] = mat3(0.0);
         [[dont_unroll]] for (uint r = 0; r < RECEIVER_NODES; ++r)
-            on_functions[k] += fits[(receiver * IRRADIANCE_FUNCTIONS + k) * RECEIVER_NODES + r] * at_nodes[r];
+            on_functions[k] += fits[receiver * FITS + k * RECEIVER_NODES + r] * at_nodes[r];
     }
 }
 

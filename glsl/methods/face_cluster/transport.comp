@@ -80,7 +80,6 @@ void main()
     }
     if (!may_face(a, b) || !may_face(b, a)) return;
 
-    uint rule = RECEIVER_NODES + (b.place_count == 1 ? RULE_NODES : 0);
     vec3 radiosity[SHOOTER_NODES];
     [[dont_unroll]] for (uint e = 0; e < SHOOTER_NODES; ++e) {
         radiosity[e] = unshot[shooter * RADIOSITY_FUNCTIONS];
@@ -115,7 +114,7 @@ void main()
             least[r] = min(least[r], scale * least_projected_area(b, -direction) * least_projected_area(a, direction));
             greatest[r] = max(greatest[r], scale * most_projected_area(b, -direction) * most_projected_area(a, direction));
             // m(x, y) B(y).                                                                    [Gobbetti2003 Eq. 3]
-            float share = rules[rule + e].weight * projected_area(b, -direction) / (PI * squared);
+            float share = shooter_weight(shooter, e) * projected_area(b, -direction) / (PI * squared);
             vec3 kept = share * kept_vector(a, direction);
             sends = sends || share > 0.0;
             sum += length(kept);

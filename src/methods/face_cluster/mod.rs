@@ -25,9 +25,10 @@
 //!
 //! Differs from [Gobbetti2003]: pairs are refined level by level by all threads at once and their contributions summed
 //! in whole units, so that the result does not depend on their order; punctual lights and an environment shine too;
-//! cubature nodes are laid on the faces, on a single one by a rule for triangles, and count where they stand in a flat
-//! element's square; flat shooters of up to eight faces are measured exactly unless they are far; what lies inside other
-//! closed bodies is no surface: it neither takes light nor weighs in a cluster's mean;
+//! cubature nodes are laid on the faces, on a single one by a rule for triangles, and count where they stand in a
+//! flat element's square, each for as much as makes their sums right over its faces, where these do not fill it;
+//! flat shooters of up to eight faces are measured exactly unless they are far; what lies inside other closed
+//! bodies is no surface: it neither takes light nor weighs in a cluster's mean;
 //! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
 //! is too small to matter, since one normal would leave half of them dark; what is near a large one is bounded by what that
 //! may fill of the hemisphere, since its nodes alone say too little; rays decide whether a pair is split and others measure

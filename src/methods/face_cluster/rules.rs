@@ -76,6 +76,12 @@ impl Rule {
         }
     }
 
+    /// Of half its degree, which are as many as its nodes can tell apart.
+    pub fn functions(self) -> u32 {
+        let degree = self.degree() / 2;
+        (degree + 1) * (degree + 2) / 2
+    }
+
     /// Weights sum to 1.                                                        [Cools2003, C2: 3-1, 4-1, 5-1]
     pub fn nodes(self) -> Vec<CubatureNode> {
         let table: Vec<(f64, f64, f64)> = match self {

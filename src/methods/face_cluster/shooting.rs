@@ -193,6 +193,8 @@ impl FaceClusters {
                 receiver_nodes: self.settings.receiver_rule.nodes().len() as u32,
                 shooter_nodes: self.settings.shooter_rule.nodes().len() as u32,
                 irradiance_functions: self.settings.irradiance_basis.functions(),
+                laid_functions: self.settings.receiver_rule.functions(),
+                sent_functions: self.settings.shooter_rule.functions(),
             },
         };
         recorder.dispatch(&pass, p.instance_count);

@@ -21,7 +21,8 @@ pub struct State {
     pub(super) nodes: Buffer<Vec3>,
     /// Per element and rule node: of the face there, a signed byte an axis.
     pub(super) normals: Buffer<u32>,
-    /// Per element, irradiance function and receiver node: how much of what arrives there the function gets.
+    /// Per element: of each irradiance function and receiver node, how much of what arrives there the function gets; then of
+    /// each shooter node, what the places around it are of all.
     pub(super) fits: Buffer<f32>,
     /// Per element and irradiance function: its mean over the element's faces.
     pub(super) function_means: Buffer<f32>,
@@ -63,10 +64,15 @@ impl Shape {
         }
     }
 
+    /// Of receiver nodes to functions, and of shooter nodes.
+    fn fits(self) -> usize {
+        self.irradiance * self.receiver_nodes + self.nodes - self.receiver_nodes
+    }
+
     /// Of the largest table, and of all, an element.
     fn bytes(self) -> (u64, u64) {
         let element = size_of::<FaceElement>();
-        let fits = 4 * self.irradiance * self.receiver_nodes;
+        let fits = 4 * self.fits();
         let widest = (12 * self.nodes).max(36 * self.irradiance).max(element).max(fits);
         let all = element + 16 * self.nodes + 24 * self.radiosity + 112 * self.irradiance + fits + 4;
         (widest as u64, all as u64)
@@ -230,7 +236,7 @@ impl Tables {
             elements: context.buffer(&buffer("elements"), capacity)?,
             nodes: context.buffer(&buffer("nodes"), capacity * shape.nodes)?,
             normals: context.buffer(&buffer("normals"), capacity * shape.nodes)?,
-            fits: context.buffer(&buffer("fits"), capacity * shape.irradiance * shape.receiver_nodes)?,
+            fits: context.buffer(&buffer("fits"), capacity * shape.fits())?,
             function_means: context.buffer(&buffer("function means"), capacity * shape.irradiance)?,
             unshot: context.buffer(&buffer("unshot"), capacity * shape.radiosity)?,
             next_unshot: context.buffer(&buffer("next unshot"), capacity * shape.radiosity)?,
