@@ -1,8 +1,9 @@
 //! Face-cluster radiosity in figures, as ratios of one run: clustering by size against N log N; solving one gallery at
-//! growing triangle counts; showing its solution against rasterising the same mesh. Fastest of several rounds.
+//! growing triangle counts, all sizes in turn in every round; showing its solution against rasterising the same mesh.
+//! Fastest of the rounds.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use glam::UVec2;
+use glam::{UVec2, Vec3};
 use linklight::display::direct::Canvas;
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::irradiance_vector;
@@ -21,7 +22,8 @@ use linklight::stages::work::Unwatched;
 use linklight::stages::world::World;
 use std::time::Duration;
 
-const ROUNDS: usize = 2;
+/// Of solving, after one that is the driver's, to compile, and the pool's, to grow.
+const ROUNDS: usize = 5;
 const BOUNCES: u32 = 4;
 const MEMORY: u64 = 12 << 30;
 const SIZE: UVec2 = UVec2::new(480, 300);
@@ -42,68 +44,143 @@ struct Shown {
     all: f64,
 }
 
-/// What one size of the gallery costs.
+/// One size of the gallery on the device, clustered, and what it costs.
 struct Row {
-    report: Report,
-    solve: f64,
+    scene: Scene,
+    geometry: Geometry,
+    pose: Pose,
+    positions: Vec<Vec3>,
+    bounds: [Vec3; 2],
+    world: World,
+    bvh: Bvh,
+    method: FaceClusters,
+    film: Film,
+    g_buffer: GBuffer,
+    shadow_maps: ShadowMaps,
+    view: View,
+    /// Seconds, and those of all processors where the system tells.
+    solve: [f64; 2],
     shown: Shown,
 }
 
-/// Or why the device cannot hold so many.
-fn row(context: &Context, triangles: u32) -> Result<Row, String> {
-    let scene = gallery(triangles);
-    let pose = Pose::rest(&scene);
-    let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
-    let vertices = deform::world_vertices(&geometry, &pose);
-    let (bounds, positions) = (vertices.bounds().unwrap(), vertices.positions);
-    let environment = Environment::default();
-    let refused = |error: &dyn std::fmt::Display| format!("{}: {error}", geometry.triangle_count());
-    let world = World::new(context, &scene, &geometry, &pose, &environment, false).map_err(|e| refused(&e))?;
-    let bvh = Bvh::build(context, &positions, &geometry.triangles).map_err(|e| refused(&e))?;
-    let stage = Stage {
-        scene: &scene,
-        geometry: &geometry,
-        rest_positions: &positions,
-        pose: &pose,
+/// Of what the solve read and the display shows.
+fn stage<'a>(
+    (scene, geometry, pose): (&'a Scene, &'a Geometry, &'a Pose),
+    (positions, bounds): (&'a [Vec3], [Vec3; 2]),
+    (world, bvh, environment): (&'a World, &'a Bvh, &'a Environment),
+) -> Stage<'a> {
+    Stage {
+        scene,
+        geometry,
+        rest_positions: positions,
+        pose,
         bounds,
-        environment: &environment,
-        world: &world,
-        bvh: &bvh,
+        environment,
+        world,
+        bvh,
         cluster_cache: None,
         watch: &Unwatched,
-    };
-    let mut method = FaceClusters::prepare(context, &stage, Settings::default()).unwrap();
-    let view = View::of_scene(&scene, &pose, None, Some(bounds), SIZE).unwrap();
-    let (film, g_buffer) =
-        (Film::new(context, SIZE.x, SIZE.y).unwrap(), GBuffer::new(context, SIZE.x, SIZE.y).unwrap());
-    let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
-    let (mut solve, mut shown) = (f64::INFINITY, Shown { raster: f64::INFINITY, all: f64::INFINITY });
-    // The first round is the driver's, to compile, and the pool's, to grow.
-    for round in 0..=ROUNDS {
-        method.solve(context, &stage, BOUNCES).unwrap();
-        let solution = method.keep(context).unwrap();
+    }
+}
+
+/// All that processors have spent on this process, the device's threads among them where the device is the processor.
+fn processor_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // User and system time are the twelfth and thirteenth after the name, in hundredths.
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+    fields.filter_map(|field| field.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
+impl Row {
+    /// Or why the device cannot hold so many.
+    fn new(context: &Context, triangles: u32) -> Result<Self, String> {
+        let scene = gallery(triangles);
+        let pose = Pose::rest(&scene);
+        let geometry = Geometry::flatten(&scene, MEMORY).unwrap();
+        let vertices = deform::world_vertices(&geometry, &pose);
+        let (bounds, positions) = (vertices.bounds().unwrap(), vertices.positions);
+        let environment = Environment::default();
+        let refused = |error: &dyn std::fmt::Display| format!("{}: {error}", geometry.triangle_count());
+        let world = World::new(context, &scene, &geometry, &pose, &environment, false).map_err(|e| refused(&e))?;
+        let bvh = Bvh::build(context, &positions, &geometry.triangles).map_err(|e| refused(&e))?;
+        let stage = stage((&scene, &geometry, &pose), (&positions, bounds), (&world, &bvh, &environment));
+        let method = FaceClusters::prepare(context, &stage, Settings::default()).unwrap();
+        let view = View::of_scene(&scene, &pose, None, Some(bounds), SIZE).unwrap();
+        let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
+        let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
+        let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
+        let (solve, shown) = ([f64::INFINITY; 2], Shown { raster: f64::INFINITY, all: f64::INFINITY });
+        Ok(Self {
+            scene,
+            geometry,
+            pose,
+            positions,
+            bounds,
+            world,
+            bvh,
+            method,
+            film,
+            g_buffer,
+            shadow_maps,
+            view,
+            solve,
+            shown,
+        })
+    }
+
+    /// Solves and shows once more; what costs less than before is kept.
+    fn round(&mut self, context: &Context, is_counted: bool) {
+        let environment = Environment::default();
+        let stage = stage(
+            (&self.scene, &self.geometry, &self.pose),
+            (&self.positions, self.bounds),
+            (&self.world, &self.bvh, &environment),
+        );
+        let before = processor_seconds();
+        self.method.solve(context, &stage, BOUNCES).unwrap();
+        let spent = processor_seconds() - before;
+        let solution = self.method.keep(context).unwrap();
         context.take_records();
         let mut recorder = context.recorder("frame").unwrap();
-        let light = method.light(&solution);
-        let (world, shadow_maps, g_buffer, view, film) = (&world, &shadow_maps, &g_buffer, &view, &film);
-        let tracer = Tracer::compute(&bvh, world);
-        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
+        let light = self.method.light(&solution);
+        let (world, shadow_maps, g_buffer) = (&self.world, &self.shadow_maps, &self.g_buffer);
+        let tracer = Tracer::compute(&self.bvh, world);
+        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view: &self.view, samples: 1, film: &self.film };
         irradiance_vector::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
+        if !is_counted {
+            return;
+        }
         let records = context.take_records();
         let ms = |is_own: &dyn Fn(&str) -> bool| -> f64 {
             let own = records.iter().filter(|record| is_own(record.name));
             own.map(|record| (record.end_ns - record.start_ns) as f64 * 1e-6).sum()
         };
-        if round > 0 {
-            solve = solve.min(method.report().solve_seconds);
-            let now = Shown { raster: ms(&|name| name.ends_with("visible_triangles")), all: ms(&|_| true) };
-            if now.all < shown.all {
-                shown = now;
-            }
+        self.solve = [self.solve[0].min(self.method.report().solve_seconds), self.solve[1].min(spent)];
+        let now = Shown { raster: ms(&|name| name.ends_with("visible_triangles")), all: ms(&|_| true) };
+        if now.all < self.shown.all {
+            self.shown = now;
         }
     }
-    Ok(Row { report: method.report().clone(), solve, shown })
+
+    fn report(&self) -> &Report {
+        self.method.report()
+    }
+}
+
+/// All these sizes in turn, so that a machine that is slower for a while is so for all of them.
+fn rows(context: &Context, sizes: &[u32]) -> Vec<Row> {
+    let mut rows: Vec<Row> = Vec::new();
+    for &triangles in sizes {
+        match Row::new(context, triangles) {
+            Ok(row) => rows.push(row),
+            Err(refusal) => println!("refused: {refusal}"),
+        }
+    }
+    for round in 0..=ROUNDS {
+        rows.iter_mut().for_each(|row| row.round(context, round > 0));
+    }
+    rows
 }
 
 fn by_size(_: &mut Criterion) {
@@ -112,15 +189,14 @@ fn by_size(_: &mut Criterion) {
     println!(
         "triangles  clustering s (M/s)   bytes/cluster  bytes/N  depth | solve s  leaves  transfers  solution MB | raster ms  picture ms"
     );
-    let mut rows = Vec::new();
-    for triangles in TRIANGLES {
-        match row(&context, triangles) {
-            Ok(row) => rows.push(row),
-            Err(refusal) => println!("refused: {refusal}"),
-        }
+    let measured =
+        |rows: &[Row]| rows.iter().map(|row| (row.report().clone(), row.solve, row.shown)).collect::<Vec<_>>();
+    let mut all = measured(&rows(&context, &TRIANGLES[..PAPERS]));
+    assert!(all.len() == PAPERS, "the device holds the paper's range");
+    for triangles in &TRIANGLES[PAPERS..] {
+        all.extend(measured(&rows(&context, &[*triangles])));
     }
-    assert!(rows.len() >= PAPERS, "the device holds the paper's range");
-    for Row { report: r, solve, shown } in &rows {
+    for (r, [solve, _], shown) in &all {
         let n = f64::from(r.triangles);
         // Triangles of three indices, and half as many vertices of three coordinates.
         let model = r.cluster_bytes as f64 / n + 12.0 + 6.0;
@@ -138,32 +214,33 @@ fn by_size(_: &mut Criterion) {
             shown.all
         );
     }
-    let spread = |of: &dyn Fn(&Row) -> f64| {
-        let values: Vec<f64> = rows[..PAPERS].iter().map(of).collect();
+    type Measured = (Report, [f64; 2], Shown);
+    let spread = |of: &dyn Fn(&Measured) -> f64| {
+        let values: Vec<f64> = all[..PAPERS].iter().map(of).collect();
         values.iter().copied().fold(0.0, f64::max) / values.iter().copied().fold(f64::INFINITY, f64::min)
     };
-    let per_n_log_n = |row: &Row| {
-        let n = f64::from(row.report.triangles);
-        row.report.clustering_seconds / (n * n.log2())
+    let per_n_log_n = |(report, ..): &Measured| {
+        let n = f64::from(report.triangles);
+        report.clustering_seconds / (n * n.log2())
     };
     println!(
-        "largest/smallest of the paper's range: solve {:.3} (goal 1.12), leaves {:.3}, clustering per N log N {:.3}",
-        spread(&|row| row.solve),
-        spread(&|row| f64::from(row.report.leaves)),
+        "largest/smallest of the paper's range: solve {:.3} (goal 1.12), of processors {:.3}, leaves {:.3}, clustering per N log N {:.3}",
+        spread(&|(_, solve, _)| solve[0]),
+        spread(&|(_, solve, _)| solve[1]),
+        spread(&|(report, ..)| f64::from(report.leaves)),
         spread(&per_n_log_n)
     );
-    for Row { report, solve, shown } in &rows[PAPERS - 1..] {
+    for (report, [solve, _], shown) in &all[PAPERS - 1..] {
         let (triangles, ratio) = (report.triangles, shown.all / shown.raster);
         println!(
             "{triangles} triangles: solve {:.2} of the smallest's, picture / rasterising {ratio:.2}",
-            solve / rows[0].solve
+            solve / all[0].1[0]
         );
     }
 }
 
 /// A wavy sheet of so many triangles: clustering alone.
 fn clustering(c: &mut Criterion) {
-    use glam::Vec3;
     use linklight::stages::clusters::{ClusterTree, MeshFaces};
     let mut group = c.benchmark_group("clustering");
     group.sample_size(10).warm_up_time(Duration::from_millis(500)).measurement_time(Duration::from_secs(5));
