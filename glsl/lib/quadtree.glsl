@@ -49,7 +49,9 @@ const uint CELL_HAS_OTHER_SIDE = 2;     // another leaf looks the other way
 // A triangle around a vertex, in texels: products of the offset from the vertex with `along_p` and `along_q` are the
 // barycentric coordinates of the other corners, in order; without area both are beyond all bounds.
 //   0, 1: along_p; along_q (1/m)
-const uint CORNER_TEXELS = 2;
+//   2: the same per half axis of the leaf's ellipse: p's two, q's two
+// The first texels of all are of no triangle: where a loop over a leaf's ends before others'.
+const uint CORNER_TEXELS = 3;
 
 // A step of the walk over all nodes from the roots down: where it goes on where a node's children are not looked at.
 struct WalkStep {

@@ -17,13 +17,32 @@ vec3 covariance_times(SurfelMoments m, vec3 v)
     return m.diagonal * v + vec3(m.mixed.x * v.y + m.mixed.z * v.z, m.mixed.x * v.x + m.mixed.y * v.z, m.mixed.z * v.x + m.mixed.y * v.y);
 }
 
-// The ellipse across `normal` of points with these moments. A sliver gets a little width, so that it has an inside.
+// The same of a normal and of what points against it.
+vec3 one_of_both(vec3 n)
+{
+    bool is_turned = n.z < 0.0;
+    if (n.z == 0.0) is_turned = n.y < 0.0;
+    if (n.z == 0.0 && n.y == 0.0) is_turned = n.x < 0.0;
+    return is_turned ? -n : n;
+}
+
+// Of the ellipse in which dot(g1, x)^2 + dot(g2, x)^2 <= 1: where one product is 1 and the other 0, m; zero without area.
+vec3[2] half_axes(Surfel s)
+{
+    vec3 along = cross(s.g2, s.normal), across = cross(s.normal, s.g1);
+    float inverse = dot(s.g1, along);
+    inverse = inverse != 0.0 ? 1.0 / inverse : 0.0;
+    return vec3[](inverse * along, inverse * across);
+}
+
+// The ellipse across `normal` of points with these moments, of both sides of a surface the same. A sliver gets a little
+// width, so that it has an inside.
 void shape_surfel(SurfelMoments m, inout Surfel s)
 {
     s.g1 = s.g2 = vec3(0.0);
     s.extent = 0.0;
     if (s.normal == vec3(0.0)) return;
-    mat3 basis = basis_of(s.normal);
+    mat3 basis = basis_of(one_of_both(s.normal));
     vec3 mu = covariance_times(m, basis[0]), mv = covariance_times(m, basis[1]);
     float p = dot(basis[0], mu), q = dot(basis[0], mv), r = dot(basis[1], mv);
     float widest = 0.5 * (p + r) + sqrt(0.25 * (p - r) * (p - r) + q * q);

@@ -6,8 +6,8 @@
 // One thread per leaf: the surfel of its element, from the third of each triangle around that belongs to it.   [Dong2007 4.1]
 // reads leaf_elements[leaf_count], element_vertices, element_normals [element_count], positions, triangles,
 // incident_offsets[vertex_count + 1], incident_triangles, back_elements[vertex_count]
-// writes surfels, moments [leaf_count ..], leaf_cells[leaf_count], corner_texels[CORNER_TEXELS *
-// incident_triangles]   shared none
+// writes surfels, moments [leaf_count ..], leaf_cells[leaf_count], corner_texels[CORNER_TEXELS * (1 +
+// incident_triangles)]   shared none
 // Differs from [Dong2007]: an ellipse about the middle of the vertex's cell instead of a disc about the vertex, so that
 // cells on edges and long cells cover no more than is there, and all of it.
 layout(local_size_x = 64) in;
@@ -24,6 +24,9 @@ layout(set = 0, binding = 9, scalar) readonly buffer BackElements { uint back_el
 layout(set = 0, binding = 10, scalar) writeonly buffer LeafCells { LeafCell leaf_cells[]; };
 layout(set = 0, binding = 11, scalar) writeonly buffer CornerTexels { uvec4 corner_texels[]; };
 layout(push_constant, scalar) uniform Params { uint leaf_count; } params;
+
+// Of barycentric coordinates' gradients: beyond all bounds.
+const float NOWHERE = 1e20;
 
 void main()
 {
@@ -50,15 +53,6 @@ void main()
         vec3 p = v.x == vertex ? b : v.y == vertex ? c : a, q = v.x == vertex ? c : v.y == vertex ? a : b;
         p -= origin;
         q -= origin;
-        if (!is_back) {
-            vec3 normal = cross(p, q);
-            float squared = dot(normal, normal);
-            // Without area: no place is in it.
-            vec3 along_p = squared > 0.0 ? cross(q, normal) / squared : vec3(1e20);
-            vec3 along_q = squared > 0.0 ? cross(normal, p) / squared : vec3(1e20);
-            corner_texels[CORNER_TEXELS * k] = uvec4(floatBitsToUint(along_p), 0);
-            corner_texels[CORNER_TEXELS * k + 1] = uvec4(floatBitsToUint(along_q), 0);
-        }
         vec3 centre = (p + q) / 3.0;
         for (uint half_index = 0; half_index < 2; ++half_index) {
             vec3 middle = 0.5 * (half_index == 0 ? p : q), sum = middle + centre;
@@ -116,4 +110,25 @@ void main()
     s.g2 *= scale;
     surfels[leaf] = s;
     moments[leaf] = m;
+    if (leaf == 0) {
+        for (uint k = 0; k < CORNER_TEXELS; ++k) corner_texels[k] = floatBitsToUint(vec4(NOWHERE));
+    }
+    // Both leaves of a vertex have the same.
+    if (is_back) return;
+    vec3 axes[2] = half_axes(s);
+    for (uint k = first; k < last; ++k) {
+        uvec3 v = triangles[incident_triangles[k]];
+        vec3 p = positions[v.x == vertex ? v.y : v.y == vertex ? v.z : v.x] - origin;
+        vec3 q = positions[v.x == vertex ? v.z : v.y == vertex ? v.x : v.y] - origin;
+        vec3 normal = cross(p, q);
+        float squared = dot(normal, normal);
+        // Without area no place is in it.
+        vec3 along_p = squared > 0.0 ? cross(q, normal) / squared : vec3(NOWHERE);
+        vec3 along_q = squared > 0.0 ? cross(normal, p) / squared : vec3(NOWHERE);
+        vec4 both = vec4(dot(along_p, axes[0]), dot(along_p, axes[1]), dot(along_q, axes[0]), dot(along_q, axes[1]));
+        uint to = CORNER_TEXELS * (k + 1);
+        corner_texels[to] = uvec4(floatBitsToUint(along_p), 0);
+        corner_texels[to + 1] = uvec4(floatBitsToUint(along_q), 0);
+        corner_texels[to + 2] = floatBitsToUint(squared > 0.0 ? both : vec4(NOWHERE));
+    }
 }

@@ -14,8 +14,8 @@ bool is_leaf_met(uint leaf, vec3 origin, vec3 way)
     vec3 to_vertex = cell.vertex - origin;
     bool is_met = false;
     for (uint k = cell.first_corner; k < cell.first_corner + cell.corner_count; ++k) {
-        vec3 along_p = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * k)).xyz);
-        vec3 along_q = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * k + 1)).xyz);
+        vec3 along_p = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * (k + 1))).xyz);
+        vec3 along_q = uintBitsToFloat(texelFetch(corner_texels, int(CORNER_TEXELS * (k + 1) + 1)).xyz);
         vec3 across = cross(along_p, along_q);
         float t = dot(across, to_vertex) / dot(across, way);
         vec3 from_vertex = t * way - to_vertex;

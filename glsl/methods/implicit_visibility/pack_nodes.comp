@@ -67,11 +67,7 @@ void main()
     Surfel s = surfels[node];
     bool is_leaf = node < params.leaf_count;
 
-    // Of the ellipse where g1 and g2 are 1.
-    vec3 along = cross(s.g2, s.normal), across = cross(s.normal, s.g1);
-    float inverse = dot(s.g1, along);
-    inverse = inverse != 0.0 ? 1.0 / inverse : 0.0;
-    vec3 first = inverse * along, second = inverse * across, vertex = vec3(0.0);
+    vec3 axes[2] = half_axes(s), first = axes[0], second = axes[1], vertex = vec3(0.0);
     uvec2 corners = uvec2(0);
     if (is_leaf) {
         LeafCell cell = leaf_cells[node];
@@ -85,7 +81,6 @@ void main()
         second = m.mixed;
         vertex = s.area > 0.0 ? m.across / s.area : vec3(0.0);
     } else {
-        vec3 axes[2] = vec3[](first, second);
         vertex = bound_children(node, s, axes);
         first = axes[0];
         second = axes[1];

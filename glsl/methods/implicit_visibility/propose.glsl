@@ -44,31 +44,37 @@ void hold_sender(uint node)
     sender.vertex = uintBitsToFloat(texelFetch(sender_texels, at + 4).xyz);
 }
 
-// Some of the triangles around a leaf: gradients of the barycentric coordinates of their other corners, of flat ones per
-// half axis.
+// Some of the triangles around a leaf: gradients of the barycentric coordinates of their other corners; of flat ones per
+// half axis, p's and q's.
 const uint HELD_CORNERS = 8;
 vec3 along_p[HELD_CORNERS];
 vec3 along_q[HELD_CORNERS];
+vec4 along_both[HELD_CORNERS];
 
 void hold_corners(uint from)
 {
     [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        bool is_held = from + k < sender.corner_count;
-        int at = is_held ? int(CORNER_TEXELS * (sender.first_corner + from + k)) : 0;
-        vec3 p = uintBitsToFloat(texelFetch(corner_texels, at).xyz), q = uintBitsToFloat(texelFetch(corner_texels, at + 1).xyz);
+        // The first texels are of no triangle: no place is in it.
+        int at = int(CORNER_TEXELS * (from + k < sender.corner_count ? 1 + sender.first_corner + from + k : 0));
         if (KIND == OF_FLAT_LEAVES) {
-            p = vec3(dot(p, sender.half_axes[0]), dot(p, sender.half_axes[1]), 0.0);
-            q = vec3(dot(q, sender.half_axes[0]), dot(q, sender.half_axes[1]), 0.0);
+            along_both[k] = uintBitsToFloat(texelFetch(corner_texels, at + 2));
+        } else {
+            along_p[k] = uintBitsToFloat(texelFetch(corner_texels, at).xyz);
+            along_q[k] = uintBitsToFloat(texelFetch(corner_texels, at + 1).xyz);
         }
-        // No place is beyond all bounds.
-        along_p[k] = is_held ? p : vec3(1e20);
-        along_q[k] = is_held ? q : vec3(1e20);
     }
 }
 
-// The cell of a leaf is where its vertex has the largest barycentric coordinate of the triangles around it. A number, not a
-// truth: threads in lockstep branch for truths.
-uint is_in_cell(float p, float q) { return uint(p >= 0.0) & uint(q >= 0.0) & uint(2.0 * p + q <= 1.0) & uint(p + 2.0 * q <= 1.0); }
+// The cell of a leaf is where its vertex has the largest barycentric coordinate of the triangles around it: where p, q,
+// 1 - 2 p - q and 1 - p - 2 q are not below zero; all times `one`. A number, below zero where one of them is: threads in
+// lockstep branch for truths. With a little more room neighbours leave nothing between them, and a triangle its rim.
+const float ROUNDING = 1e-6;
+
+int is_beside_cell(float p, float q, float one)
+{
+    float room = ROUNDING * one, rest = one + room - (p + q);
+    return floatBitsToInt(p + room) | floatBitsToInt(q + room) | floatBitsToInt(rest - p) | floatBitsToInt(rest - q);
+}
 
 // Where a direction meets the sender, in lengths of the direction; FAR where it does not.
 struct Meeting {
@@ -88,26 +94,51 @@ Meeting meet_leaf(vec3 to_vertex, vec3 direction)
         bool is_shown = !is_back || (sender.sides & CELL_HAS_OTHER_SIDE) == 0;
         vec3 from_vertex = t * direction - to_vertex;
         bool is_nearer = t > 0.0 && t < nearest.t && is_shown
-                         && is_in_cell(dot(along_p[k], from_vertex), dot(along_q[k], from_vertex)) != 0;
+                         && is_beside_cell(dot(along_p[k], from_vertex), dot(along_q[k], from_vertex), 1.0) >= 0;
         nearest.t = is_nearer ? t : nearest.t;
         nearest.is_back = is_nearer ? is_back : nearest.is_back;
     }
     return nearest;
 }
 
-// On the plane of a leaf's cell or of a node's parallelogram, or on an outline's ellipse; `x` and `y` by `slope` tell where.
-float meet_ellipse(SeenEllipse e, vec3 direction)
+// An ellipse as a face's cells meet it, at `x / slope` and `y / slope` half axes of it, of a flat leaf's from its vertex:
+// each by column, by row, and in the first cell. No slope above zero: behind the receiver.
+struct EllipseInCells {
+    vec3 x;
+    vec3 y;
+    vec3 slope;
+};
+
+vec3 in_cells(vec3 w, uint face, float per_bin)
 {
-    float slope = dot(e.of_plane, direction), x = dot(e.of_b, direction), y = dot(e.of_a, direction);
-    float t = e.volume / slope;
-    if (KIND == OF_PLANES) return t > 0.0 && max(abs(x), abs(y)) <= IN_CORNERS * abs(slope) ? t : FAR;
-    if (KIND == OF_OUTLINES) return t > 0.0 && x * x + y * y <= slope * slope ? t : FAR;
-    vec2 from_vertex = vec2(-x, y) / slope - sender.vertex.xy;
-    uint is_in = 0;
-    [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
-        is_in |= is_in_cell(dot(along_p[k].xy, from_vertex), dot(along_q[k].xy, from_vertex));
+    vec3 f = in_face(face, w);
+    return vec3(2.0 * per_bin * f.xy, f.z + (per_bin - 1.0) * (f.x + f.y));
+}
+
+EllipseInCells ellipse_in_cells(SeenEllipse e, uint face, float per_bin)
+{
+    float side = e.volume < 0.0 ? -1.0 : 1.0;
+    vec3 of_plane = side * e.of_plane, of_x = -side * e.of_b, of_y = side * e.of_a;
+    if (KIND == OF_FLAT_LEAVES) {
+        of_x -= sender.vertex.x * of_plane;
+        of_y -= sender.vertex.y * of_plane;
     }
-    return is_in != 0 && t > 0.0 ? t : FAR;
+    return EllipseInCells(in_cells(of_x, face, per_bin), in_cells(of_y, face, per_bin), in_cells(of_plane, face, per_bin));
+}
+
+float in_cell(vec3 f, vec2 cell) { return f.x * cell.x + f.y * cell.y + f.z; }
+
+// Whether a cell's centre sees a leaf's cell, a node's parallelogram or an outline's ellipse.
+bool is_met(EllipseInCells e, vec2 cell)
+{
+    float slope = in_cell(e.slope, cell), x = in_cell(e.x, cell), y = in_cell(e.y, cell);
+    if (KIND == OF_PLANES) return max(abs(x), abs(y)) <= IN_CORNERS * slope;
+    if (KIND == OF_OUTLINES) return slope > 0.0 && x * x + y * y <= slope * slope;
+    int is_beside = -1;
+    [[unroll]] for (uint k = 0; k < HELD_CORNERS; ++k) {
+        is_beside &= is_beside_cell(dot(along_both[k].xy, vec2(x, y)), dot(along_both[k].zw, vec2(x, y)), slope);
+    }
+    return (is_beside | floatBitsToInt(slope)) >= 0;
 }
 
 // Fronts of a body hide as many backs: these show for the most part where they are twice as many. All that looks either
@@ -129,11 +160,13 @@ vec3[2] outline_axes(vec3 direction)
     return vec3[](SURFEL_OUTLINE * (l11 * basis[0] + l21 * basis[1]), SURFEL_OUTLINE * l22 * basis[1]);
 }
 
+// In -1..1 of a face.
+vec2 bin_centre(vec2 cell, float per_bin) { return (2.0 * cell + 1.0) * per_bin - 1.0; }
+
 void propose(uint place, float distance_there, bool is_back)
 {
     uint64_t key = packUint2x32(uvec2(sender.node | (is_back ? BACK_SEEN : 0u), floatBitsToUint(distance_there)));
-    // What another thread writes meanwhile is nearer, not farther.
-    if (key < keys[place]) atomicMin(keys[place], key);
+    atomicMin(keys[place], key);    // most are the nearest so far: to look first costs more than it saves
 }
 
 // To the receiver `at`, whose first bin is at `row`, unless `is_dropped`.
@@ -160,11 +193,13 @@ void link(Receiver at, uint row, bool is_dropped)
         return;
     }
     SeenEllipse seen = seen_ellipse(c, axes[0], axes[1]);
+    if (KIND != OF_LEAVES) is_dropped = is_dropped || seen.volume == 0.0;       // edge on
     SeenOutline outline;
     if (KIND == OF_LEAVES) outline = seen_sphere(c, sender.extents.radius);
     else outline = outline_of(seen, c, axes[0], axes[1]);
 
     // Face by face, from that of the centre on.
+    float per_bin = 1.0 / float(params.n);
     uint faces = 1u << face_of(c);
     bool is_first = true;
     do {
@@ -175,12 +210,17 @@ void link(Receiver at, uint row, bool is_dropped)
         is_first = false;
         CellWalk walk = walk_cells(ranges, params.n);
         if (is_dropped) walk.last.y = -1.0;
+        EllipseInCells ellipse;
+        if (KIND != OF_LEAVES) ellipse = ellipse_in_cells(seen, face, per_bin);
         do {
-            vec2 uv = (2.0 * walk.at + 1.0) / float(params.n) - 1.0;
-            vec3 direction = face_direction(face, uv);
-            Meeting met;
-            if (KIND == OF_LEAVES) met = meet_leaf(to_vertex, IS_TURNED != 0 ? turn(at.frame, direction) : direction);
-            else met = Meeting(meet_ellipse(seen, direction), is_behind);
+            Meeting met = Meeting(FAR, is_behind);
+            if (KIND == OF_LEAVES) {
+                vec3 direction = face_direction(face, bin_centre(walk.at, per_bin));
+                met = meet_leaf(to_vertex, IS_TURNED != 0 ? turn(at.frame, direction) : direction);
+            } else if (is_met(ellipse, walk.at)) {
+                met.t = abs(seen.volume) / in_cell(ellipse.slope, walk.at);
+            }
+            vec2 uv = bin_centre(walk.at, per_bin);
             if (has_cell(walk) && met.t < FAR)
                 propose(row + bin_at(face, walk.at, params.n), met.t * sqrt(1.0 + dot(uv, uv)), met.is_back);
             next_cell(walk);

@@ -27,7 +27,7 @@ pub struct Quadtrees {
     pub moments: Buffer<SurfelMoments>,
     /// One per leaf.
     pub leaf_cells: Buffer<LeafCell>,
-    /// `CORNER_TEXELS` per entry of the elements' incident triangles.
+    /// `CORNER_TEXELS` of no triangle, then so many per entry of the elements' incident triangles.
     pub corner_texels: TexelBuffer,
     /// One per node.
     walk: Buffer<WalkStep>,
@@ -40,7 +40,7 @@ pub struct Quadtrees {
 
 /// Texels of a step of the walk and of a corner of a leaf's cell; the layouts are those of `lib/quadtree.glsl`.
 const WALK_TEXELS: usize = 3;
-const CORNER_TEXELS: usize = 2;
+const CORNER_TEXELS: usize = 3;
 
 impl Quadtrees {
     /// Uploads the topology; [`Self::pull_surfels`] places the nodes.
@@ -55,7 +55,7 @@ impl Quadtrees {
             surfels: context.buffer("quadtree/surfels", count)?,
             moments: context.buffer("quadtree/moments", count)?,
             leaf_cells: context.buffer("quadtree/leaf cells", topology.leaf_count() as usize)?,
-            corner_texels: context.texel_buffer("quadtree/corner texels", (CORNER_TEXELS * corner_count).max(1))?,
+            corner_texels: context.texel_buffer("quadtree/corner texels", CORNER_TEXELS * (1 + corner_count))?,
             walk_starts: context.upload("quadtree/walk starts", &topology.steps_above(&walk, 2))?,
             walk: context.upload("quadtree/walk", &walk)?,
             walk_texels: context.texel_buffer("quadtree/walk texels", (WALK_TEXELS * count).max(1))?,
@@ -69,7 +69,7 @@ impl Quadtrees {
         let node = size_of::<Surfel>() + size_of::<SurfelMoments>() + walk + 3 * size_of::<u32>();
         u64::from(topology.node_count()) * node as u64
             + u64::from(topology.leaf_count()) * (size_of::<LeafCell>() + size_of::<u32>()) as u64
-            + (16 * CORNER_TEXELS * corner_count) as u64
+            + (16 * CORNER_TEXELS * (1 + corner_count)) as u64
             + (topology.segments.len() * size_of::<QuadtreeSegment>()) as u64
     }
 
