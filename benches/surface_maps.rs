@@ -236,7 +236,7 @@ fn waiting(context: &Context, maps: &SurfaceMaps, places: &[u32]) {
     }
     let each = |sum: usize| sum as f64 / places.len() as f64;
     println!(
-        "  a look-up in {:?} runs fetches {:.2} texels one after the other, of {:.2} cache lines in {:.2} pages; {} lines of {} in all",
+        "  a look-up in {:?} runs fetches {:.2} texels, of {:.2} cache lines in {:.2} pages; {} lines of {} in all",
         maps.layout(),
         each(fetches),
         each(lines),

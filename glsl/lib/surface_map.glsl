@@ -3,9 +3,10 @@
 // Whether a texel of the atlas sees a point, by its compressed depth cube map.                  [Ritschel2008 3.2]
 //
 // Bridges: the kernel binds the runs of all pixels, as texels of four words.
-//     uvec4 surface_offset_texel(uint i)     marked: 96 bits, set where a run starts, and the number of the first of these runs;
-//                                            else where the runs of three of the pixels' blocks start, and where the last ends
-//     uvec4 surface_run_texel(uint i)        depths, two a word; from firsts_at where runs start in their blocks, if not marked
+//     uvec4 surface_offset_texel(uint i)     marked: of each pixel the number of its first run; from firsts_at 112 bits,
+//                                            set where a run starts, and 16 for how many of its pixel's do before;
+//                                            else where runs of three of the pixels' blocks start, and where the last ends
+//     uvec4 surface_run_texel(uint i)        depths, two a word; not marked: from firsts_at where runs start in their blocks
 #include "lib/cube_map.glsl"
 #include "lib/random.glsl"
 
@@ -17,9 +18,9 @@ struct SurfaceMapFrame {
     float codes_per_metre;
     uint filter_mode;       // 0: the pixel itself, 1: one of four around, drawn by its share, 2: all four
     uint sender_filter;     // of the sender's texel and those beside it: 0, 1, 2 likewise
-    uint block_bits;        // places of a block are 2 to this, 8 or 16; 0: 96, marked
+    uint block_bits;        // places of a block are 2 to this, 8 or 16; 0: 112, marked
     uint block_count;
-    uint firsts_at;         // texels before those that tell where runs start
+    uint firsts_at;         // texels before those that tell where runs start, of either table
     float near_share;       // of a point's distance: what is closer before it than that does not count; a ray looks there
 };
 
@@ -34,12 +35,12 @@ uint word_of(uvec4 texel, uint k) { return k < 2 ? (k == 0 ? texel.x : texel.y) 
 // The run that holds at a place of the sequence, by the marks: as many start at it or before as bits are set up to it.
 uint marked_run(SurfaceMapFrame frame, uint place, uint pixel)
 {
-    uint block = place / 96u, within = place - 96u * block;
-    uvec4 marks = surface_offset_texel(pixel * frame.block_count + block);
-    uvec3 upto = uvec3(within, max(within, 32u) - 32, max(within, 64u) - 64);
-    uvec3 set = marks.xyz & uvec3(0xffffffffu) >> 31 - min(upto, 31u);
-    ivec3 counts = bitCount(set);
-    return marks.w + counts.x + (within < 32 ? 0 : counts.y) + (within < 64 ? 0 : counts.z) - 1;
+    uint block = place / 112u, within = place - 112u * block;
+    uvec4 marks = surface_offset_texel(frame.firsts_at + pixel * frame.block_count + block);
+    uint before = word_of(surface_offset_texel(pixel >> 2), pixel & 3) + (marks.w >> 16);
+    const uvec4 starts = uvec4(0, 32, 64, 96);
+    ivec4 set = bitCount(marks & uvec4(0xffffffffu) >> 31 - min(max(uvec4(within), starts) - starts, 31u));
+    return before + set.x + (within < 32 ? 0 : set.y) + (within < 64 ? 0 : set.z) + (within < 96 ? 0 : set.w) - 1;
 }
 
 // The same by search for the last run of the place's block that starts at it or before: first among texels of 16 (or 8)
