@@ -4,7 +4,7 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::{UVec2, Vec3};
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::irradiance_vector;
 use linklight::display::shadow_maps::ShadowMaps;
@@ -145,7 +145,8 @@ impl Row {
         let light = self.method.light(&solution);
         let (world, shadow_maps, g_buffer) = (&self.world, &self.shadow_maps, &self.g_buffer);
         let tracer = Tracer::compute(&self.bvh, world);
-        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view: &self.view, samples: 1, film: &self.film };
+        let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+        let canvas = Canvas { lighting, view: &self.view, samples: 1, film: &self.film };
         irradiance_vector::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         if !is_counted {

@@ -5,7 +5,7 @@ mod common;
 use common::TestContext;
 use common::scenes::{lambert, light, nearest_texture, parallelogram, scene};
 use glam::{UVec2, Vec2, Vec3, Vec4};
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::vertex::{self, VertexLight};
@@ -64,7 +64,8 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
     shadow_maps.draw(&mut recorder, &world, &pose, vertices.bounds().unwrap());
     let tracer = Tracer::compute(&bvh, &world);
     let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
-    vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film });
+    let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+    vertex::draw(&mut recorder, light, Canvas { lighting, view, samples, film });
     recorder.submit().unwrap();
     Shown {
         direct: context.download(&film.direct).unwrap(),

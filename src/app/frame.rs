@@ -8,7 +8,7 @@ pub use super::output::picture;
 use super::render::RenderRequest;
 use super::stage::Stage;
 use super::{AppError, views};
-use crate::display::direct::{Canvas, Sample};
+use crate::display::direct::{Canvas, Lighting, Sample};
 use crate::display::final_gather::{FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::shadow_maps::ShadowMaps;
@@ -334,7 +334,8 @@ impl Method {
                     shadow_maps.draw(recorder, world, pose, *bounds);
                     // False colours are those of vertices.
                     let (tracer, samples) = (stage.tracer(), request.spp);
-                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
+                    let canvas =
+                        Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film };
                     match (splat_sums, method.splats(), light.colors) {
                         (Some(sums), Some(splats), None) => {
                             splat::draw(recorder, SplatLight { vertices: light, splats, sums }, canvas);

@@ -5,7 +5,7 @@ use super::cli::Display;
 use super::frame::{Gathering, check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::final_gather::{FinalGather, Gathered};
 use crate::display::g_buffer::GBuffer;
 use crate::display::irradiance_vector;
@@ -205,7 +205,8 @@ impl ClustersShown {
                 Some(gather) => gather.fill(recorder, stage, light, request.bounces > 0),
                 None => {
                     let (tracer, samples) = (stage.tracer(), request.spp);
-                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
+                    let canvas =
+                        Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film };
                     irradiance_vector::draw(recorder, light, canvas);
                 }
             }

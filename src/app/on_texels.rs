@@ -5,7 +5,7 @@ use super::cli::Display;
 use super::frame::{Gathering, check_visibility, gather_samples};
 use super::render::{RenderRequest, cache_folder};
 use super::stage::Stage;
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::final_gather::{self, FinalGather, Gathered, Visibility};
 use crate::display::g_buffer::GBuffer;
 use crate::display::glossy_texels::GlossyTexels;
@@ -230,7 +230,8 @@ impl TexelsShown {
                     }
                     let (shadow_maps, g_buffer, view) = (&self.shadow_maps, &self.g_buffer, &stage.view);
                     let (tracer, samples) = (stage.tracer(), request.spp);
-                    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film };
+                    let canvas =
+                        Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film };
                     display.draw(recorder, light, canvas);
                 });
                 Ok(recorder.submit()?)

@@ -15,11 +15,7 @@ use glam::UVec2;
 /// What a display stage draws with, and into.
 #[derive(Clone, Copy)]
 pub struct Canvas<'a> {
-    pub world: &'a World,
-    pub shadow_maps: &'a ShadowMaps,
-    /// Casts rays where shadow maps leave doubt.
-    pub tracer: Tracer<'a>,
-    pub g_buffer: &'a GBuffer,
+    pub lighting: Lighting<'a>,
     pub view: &'a View,
     /// Places within each pixel, at least 1.
     pub samples: u32,
@@ -27,12 +23,6 @@ pub struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// What lights its surfaces.
-    pub fn lighting(&self) -> Lighting<'_> {
-        let Self { world, shadow_maps, tracer, g_buffer, .. } = *self;
-        Lighting { world, shadow_maps, tracer, g_buffer }
-    }
-
     /// Fills the film with the mean of all samples, each shifted within the pixel: direct light, then what `add` draws of
     /// one sample, which counts by the weight it is given. Without light (`is_unlit`) surfaces start black.
     pub fn draw(
@@ -41,14 +31,14 @@ impl Canvas<'_> {
         is_unlit: bool,
         mut add: impl FnMut(&mut Recorder<'_>, &PixelView, f32),
     ) {
-        let Self { world, g_buffer, view, samples, film, .. } = *self;
+        let Self { lighting, view, samples, film } = *self;
         let size = UVec2::new(film.width, film.height);
         for index in 0..samples {
             let pixel_view = PixelView::new(view, size, index, samples);
             recorder.scope("sample", |recorder| {
                 let sample = Sample { index, samples, is_unlit };
-                g_buffer.draw(recorder, world, &pixel_view);
-                self.lighting().shade(recorder, &pixel_view, sample, world.light_count, film);
+                lighting.g_buffer.draw(recorder, lighting.world, &pixel_view);
+                lighting.shade(recorder, &pixel_view, sample, lighting.world.light_count, film);
                 add(recorder, &pixel_view, 1.0 / samples as f32);
             });
         }
@@ -70,6 +60,7 @@ pub struct Sample {
 pub struct Lighting<'a> {
     pub world: &'a World,
     pub shadow_maps: &'a ShadowMaps,
+    /// Casts rays where shadow maps leave doubt.
     pub tracer: Tracer<'a>,
     pub g_buffer: &'a GBuffer,
 }

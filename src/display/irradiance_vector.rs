@@ -6,7 +6,7 @@
 //! [Gobbetti2003]: crate::methods::PAPERS
 
 use super::PixelView;
-use super::direct::Canvas;
+use super::direct::{Canvas, Lighting};
 use crate::gpu::Recorder;
 use crate::gpu::shaders::display::{IrradianceVector, IrradianceVectorConstants, IrradianceVectorParams};
 use crate::stages::irradiance_vector::ElementLight;
@@ -26,7 +26,7 @@ pub fn add(
     pixel_view: &PixelView,
     weight: f32,
 ) {
-    let Canvas { world, g_buffer, film, .. } = canvas;
+    let Canvas { lighting: Lighting { world, g_buffer, .. }, film, .. } = canvas;
     let pass = IrradianceVector {
         visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
         g_position: g_buffer.sampled(&g_buffer.position),

@@ -4,7 +4,7 @@
 //! ones are left out, so that nothing bleeds in over the border.
 
 use super::PixelView;
-use super::direct::Canvas;
+use super::direct::{Canvas, Lighting};
 use crate::gpu::shaders::display::{Lightmap as Pass, LightmapParams};
 use crate::gpu::shaders::types::{AtlasTexel, TriangleCorners};
 use crate::gpu::{Buffer, Context, GpuError, Recorder};
@@ -72,7 +72,7 @@ impl Lightmap {
         pixel_view: &PixelView,
         weight: f32,
     ) {
-        let Canvas { world, g_buffer, film, .. } = canvas;
+        let Canvas { lighting: Lighting { world, g_buffer, .. }, film, .. } = canvas;
         let pass = Pass {
             visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
             g_position: g_buffer.sampled(&g_buffer.position),

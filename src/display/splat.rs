@@ -8,7 +8,7 @@
 //! [Dachsbacher2007]: crate::methods::PAPERS
 
 use super::PixelView;
-use super::direct::Canvas;
+use super::direct::{Canvas, Lighting};
 use super::vertex::VertexLight;
 use crate::gpu::shaders::display::{
     Splat, SplatLight as LightOfSplats, SplatLightParams, SplatNormalize, SplatNormalizeParams, SplatParams,
@@ -58,7 +58,7 @@ pub fn add(
     pixel_view: &PixelView,
     weight: f32,
 ) {
-    let Canvas { world, g_buffer, film, .. } = canvas;
+    let Canvas { lighting: Lighting { world, g_buffer, .. }, film, .. } = canvas;
     let SplatLight { vertices, splats, sums } = light;
     let light_of_splats = LightOfSplats {
         splats: &splats.splats,

@@ -1,7 +1,7 @@
 //! Vertex display: punctual light per pixel by shadow maps, all other light interpolated between vertices.
 
 use super::PixelView;
-use super::direct::Canvas;
+use super::direct::{Canvas, Lighting};
 use crate::gpu::shaders::display::{Vertex, VertexParams};
 use crate::gpu::{Buffer, Recorder};
 use glam::Vec3;
@@ -28,7 +28,7 @@ pub fn draw(recorder: &mut Recorder<'_>, light: VertexLight<'_>, canvas: Canvas<
 
 /// What a sample adds to the film, the G-buffer being drawn.
 pub fn add(recorder: &mut Recorder<'_>, light: VertexLight<'_>, canvas: Canvas<'_>, view: &PixelView, weight: f32) {
-    let Canvas { world, g_buffer, film, .. } = canvas;
+    let Canvas { lighting: Lighting { world, g_buffer, .. }, film, .. } = canvas;
     let pass = Vertex {
         visible_triangles: g_buffer.sampled(&g_buffer.visible_triangles),
         g_position: g_buffer.sampled(&g_buffer.position),

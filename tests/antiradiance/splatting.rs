@@ -5,7 +5,7 @@ use crate::common::scenes::{lambert, parallelogram, scene};
 use crate::fixture::Fixture;
 use crate::support::{prepare, settings};
 use glam::{UVec2, Vec2, Vec3};
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::splat::{self, SplatLight, SplatSums};
@@ -49,7 +49,8 @@ fn splats_reproduce_even_and_linear_light() {
         let light = SplatLight { vertices, splats: method.splats(), sums: &sums };
         let (world, shadow_maps, g_buffer) = (&fixture.world, &shadow_maps, &g_buffer);
         let tracer = fixture.stage().tracer;
-        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view: &view, samples: 1, film: &film };
+        let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+        let canvas = Canvas { lighting, view: &view, samples: 1, film: &film };
         splat::draw(&mut recorder, light, canvas);
         recorder.submit().unwrap();
         context.download(&film.indirect).unwrap()

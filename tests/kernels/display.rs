@@ -9,7 +9,7 @@ use crate::common::{Random, TestContext};
 use crate::compare::{Tolerance, hold, tells_apart};
 use glam::{UVec2, Vec2, Vec3, Vec4};
 use linklight::display::PixelView;
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::pixel_samples::sample_offset;
 use linklight::display::shadow_maps::ShadowMaps;
@@ -256,7 +256,8 @@ impl Case {
         let by_query = structure.as_ref().filter(|_| by_query).map(|structure| Tracer::ray_query(structure, world));
         let tracer = by_query.unwrap_or(Tracer::compute(&bvh, world));
         shadow_maps.draw(&mut recorder, world, pose, vertices.bounds().unwrap());
-        vertex::draw(&mut recorder, light, Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film });
+        let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+        vertex::draw(&mut recorder, light, Canvas { lighting, view, samples, film });
         recorder.submit().unwrap();
         let got = Pictures {
             direct: context.download(&film.direct).unwrap(),

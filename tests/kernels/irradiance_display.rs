@@ -5,7 +5,7 @@ use crate::compare::{hold, tells_apart};
 use crate::display::{Case, RADIANCE, SIZE, Surfaces, brdf, case};
 use crate::irradiance_vector::{FUNCTIONS, Leaves, REACH, UNIT, packed};
 use glam::{Mat3, UVec2, Vec2, Vec3, Vec4};
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::shadow_maps::ShadowMaps;
 use linklight::display::{PixelView, irradiance_vector};
@@ -144,7 +144,8 @@ impl Lit {
         let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
         let tracer = Tracer::compute(&bvh, world);
         let mut recorder = context.recorder("test").unwrap();
-        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
+        let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+        let canvas = Canvas { lighting, view, samples: 1, film };
         irradiance_vector::draw(&mut recorder, light, canvas);
         g_buffer.draw(&mut recorder, world, &PixelView::new(view, SIZE, 0, 1));
         recorder.submit().unwrap();

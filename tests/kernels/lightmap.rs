@@ -5,7 +5,7 @@ use crate::compare::{hold, tells_apart};
 use crate::display::{Case, RADIANCE, SIZE, Surfaces, case, even_albedo};
 use glam::{IVec2, UVec2, Vec2, Vec3};
 use linklight::display::PixelView;
-use linklight::display::direct::Canvas;
+use linklight::display::direct::{Canvas, Lighting};
 use linklight::display::g_buffer::GBuffer;
 use linklight::display::lightmap::{Lightmap, TexelLight};
 use linklight::display::shadow_maps::ShadowMaps;
@@ -99,7 +99,8 @@ fn lightmap_agrees_with_its_twin() {
     let (world, shadow_maps, g_buffer, film) = (&world, &shadow_maps, &g_buffer, &film);
     let tracer = Tracer::compute(&bvh, world);
     let mut recorder = context.recorder("test").unwrap();
-    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples: 1, film };
+    let lighting = Lighting { world, shadow_maps, tracer, g_buffer };
+    let canvas = Canvas { lighting, view, samples: 1, film };
     lightmap.draw(&mut recorder, light, canvas);
     let size = UVec2::new(SIZE.x, SIZE.y);
     g_buffer.draw(&mut recorder, world, &PixelView::new(view, size, 0, 1));

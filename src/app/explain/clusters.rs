@@ -6,7 +6,7 @@ use super::probe::{Probe, Seen};
 use super::{Frame, Parts, add};
 use crate::app::AppError;
 use crate::app::on_clusters::{ClustersShown, cluster_stage};
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::irradiance_vector;
 use crate::gpu::shaders::types::{LeafElement, SharedVectors};
 use crate::gpu::{Buffer, Context};
@@ -30,7 +30,8 @@ pub fn explain(
         let solution = method.keep(context).map_err(AppError::failed)?;
         let light = method.light(&solution);
         let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
-        let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
+        let canvas =
+            Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film: &scratch };
         let probe = Probe::new(context, stage, canvas, pixel)?;
         // Light without the method counts once.
         let mut others = Parts::new();

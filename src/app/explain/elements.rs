@@ -10,7 +10,7 @@ use crate::app::AppError;
 use crate::app::frame::{VertexShown, explicit_stage};
 use crate::app::on_elements::OnElements;
 use crate::app::stage::Stage;
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::splat::{self, SplatLight};
 use crate::display::vertex::{self, VertexLight};
 use crate::gpu::Buffer;
@@ -114,7 +114,7 @@ fn weights(
     let scratch = Film::new(context, request.width, request.height)?;
     let VertexShown { method, shadow_maps, g_buffer, splat_sums, .. } = shown;
     let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
-    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
+    let canvas = Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film: &scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     let elements = method.elements();
     let ones: Buffer<Vec3> = context.upload("explain/ones", &vec![Vec3::ONE; elements.count as usize])?;

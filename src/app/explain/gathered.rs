@@ -9,7 +9,7 @@ use crate::app::AppError;
 use crate::app::frame::Method;
 use crate::app::render::RenderRequest;
 use crate::app::stage::Stage;
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::final_gather::{NO_SENDER, Visibility};
 use crate::gpu::Context;
 use crate::report::explanation::Light;
@@ -94,15 +94,9 @@ fn lights(
             "--explain follows a final gather that sees by rays; set gather_visibility=rays or none".into(),
         ));
     }
-    let canvas = Canvas {
-        world: &stage.world,
-        shadow_maps: shown.shadow_maps,
-        tracer: stage.tracer(),
-        g_buffer: shown.g_buffer,
-        view: &stage.view,
-        samples: request.spp,
-        film: scratch,
-    };
+    let (world, tracer) = (&stage.world, stage.tracer());
+    let lighting = Lighting { world, shadow_maps: shown.shadow_maps, tracer, g_buffer: shown.g_buffer };
+    let canvas = Canvas { lighting, view: &stage.view, samples: request.spp, film: scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     for index in 0..request.spp {
         if let Some(triangle) = probe.sample(index, parts)?.triangle {

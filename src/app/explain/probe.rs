@@ -6,7 +6,7 @@ use super::{Parts, add};
 use crate::app::AppError;
 use crate::app::stage::Stage;
 use crate::display::PixelView;
-use crate::display::direct::{Canvas, Sample};
+use crate::display::direct::{Canvas, Lighting, Sample};
 use crate::gpu::{Context, Recorder};
 use crate::report::explanation::Light;
 use crate::scene::LightKind;
@@ -57,7 +57,7 @@ impl<'a> Probe<'a> {
     /// Draws the G-buffer of sample `index`, adds the light that is there without the method to `parts`, and leaves the
     /// G-buffer as it is for [`Self::reflectance`].
     pub fn sample(&self, index: u32, parts: &mut Parts) -> Result<Seen, AppError> {
-        let Canvas { world, g_buffer, view, samples, film, .. } = self.canvas;
+        let Canvas { lighting: Lighting { world, g_buffer, .. }, view, samples, film } = self.canvas;
         let size = UVec2::new(film.width, film.height);
         let view = PixelView::new(view, size, index, samples);
         let mut recorder = self.context.recorder("explain")?;
@@ -97,13 +97,13 @@ impl<'a> Probe<'a> {
 
     /// Emission or background, then light after light: what each changes of the picture.
     fn add_lights(&self, view: &PixelView, sample: Sample, hits: bool, parts: &mut Parts) -> Result<(), AppError> {
-        let Canvas { world, film, .. } = self.canvas;
-        let total = if hits { world.light_count } else { 0 };
+        let Canvas { lighting, film, .. } = self.canvas;
+        let total = if hits { lighting.world.light_count } else { 0 };
         let steps: Vec<u32> = if total <= MOST_LIGHTS { (0..=total).collect() } else { vec![0, total] };
         let mut before = DVec3::ZERO;
         for count in steps {
             let mut recorder = self.context.recorder("explain")?;
-            self.canvas.lighting().shade(&mut recorder, view, sample, count, film);
+            lighting.shade(&mut recorder, view, sample, count, film);
             recorder.submit()?;
             let at = self.at();
             let now = self.context.download_range(&film.direct, at..at + 1)?[0].as_dvec3();

@@ -8,7 +8,7 @@ use super::probe::{Probe, Seen};
 use super::{Frame, Parts, add};
 use crate::app::AppError;
 use crate::app::on_texels::{LightmapShown, TexelsShown};
-use crate::display::direct::Canvas;
+use crate::display::direct::{Canvas, Lighting};
 use crate::display::lightmap::{Gloss, TexelLight};
 use crate::report::explanation::Light;
 use crate::scene::atlas::{Atlas, NO_TEXEL};
@@ -26,7 +26,7 @@ pub fn explain(
     };
     let scratch = Film::new(context, request.width, request.height)?;
     let (world, tracer, view, samples) = (&stage.world, stage.tracer(), &stage.view, request.spp);
-    let canvas = Canvas { world, shadow_maps, tracer, g_buffer, view, samples, film: &scratch };
+    let canvas = Canvas { lighting: Lighting { world, shadow_maps, tracer, g_buffer }, view, samples, film: &scratch };
     let probe = Probe::new(context, stage, canvas, pixel)?;
     let ones = context.upload("explain/ones", &vec![Vec3::ONE; method.texels.count as usize])?;
     let zeros = context.upload("explain/zeros", &vec![Vec3::ZERO; method.atlas.texel_at.len()])?;
