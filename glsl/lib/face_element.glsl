@@ -58,8 +58,9 @@ struct PoolCounters {
 // Normal-projected area, m2: the length of the vector area.                                    [Gobbetti2003 3.1]
 float vector_area(FaceElement e) { return max(e.facing[4] - e.facing[5], 0.0); }
 
-// Whether the faces look so many ways that light from behind the mean normal reaches much of them.
-bool is_bent(FaceElement e) { return vector_area(e) < 0.7 * e.area; }
+// Whether the faces look so many ways that light from behind the mean normal reaches much of them: two at a right angle
+// do, of which it is 0.707.
+bool is_bent(FaceElement e) { return vector_area(e) < 0.8 * e.area; }
 
 // Whether the faces lie in one plane, nearly.
 bool is_flat(FaceElement e) { return e.place_count == 1 || vector_area(e) > 0.99 * e.area; }

@@ -320,3 +320,30 @@ fn borders_of_a_lamps_shadow_are_found() {
     println!("off by {:.3} of the light, {count} elements, {} transfers", off / sum, method.report().transfers());
     assert!(off / sum < 0.052, "off by {} of the light", off / sum);
 }
+
+/// A roof of two slopes of 40 degrees, lit from below its mean normal's horizon by less than errors may be: one slope is
+/// lit as by itself, the other is dark. One element of both lays all of it along the mean normal.
+#[test]
+fn slopes_of_a_roof_are_lit_apart() {
+    let context = TestContext::new();
+    let mut roof = parallelogram(Vec3::new(-0.1, 0.0, 0.1), Vec3::X * 0.2, Vec3::NEG_Z * 0.2, 2, 0);
+    roof.positions.iter_mut().for_each(|p| p.y = -p.x.abs() * 40f32.to_radians().tan());
+    let panel = parallelogram(Vec3::new(6.0, -1.6, -0.5), Vec3::Z, Vec3::Y, 4, 1);
+    let mut materials = vec![one_sided(0.5), one_sided(0.0)];
+    materials[1].emission = Vec3::ONE;
+    let fixture = Fixture::new(&context, scene(materials, vec![roof, panel], &[]), None);
+    let settings = Settings { threshold: 1e-3, ..Settings::default() };
+    let leaves = leaves(&context, &fixture.solve(&context, settings, 0));
+    let irradiance = |side: f32| {
+        let (power, area) = received(&leaves, |e| e.albedo.x > 0.2 && side * e.axis_z.x > 0.5);
+        assert!(area > 0.02, "an element has both slopes");
+        power / area
+    };
+    // From the middle of the lit slope to that of the panel.
+    let way = Vec3::new(6.0, -1.1, 0.0) - Vec3::new(0.05, -0.05 * 40f32.to_radians().tan(), 0.0);
+    let normal = Vec3::new(40f32.to_radians().sin(), 40f32.to_radians().cos(), 0.0);
+    let expected = f64::from(normal.dot(way) * way.x / way.length_squared().powi(2));
+    let (lit, dark) = (irradiance(1.0), irradiance(-1.0));
+    println!("lit slope {lit} W/m2, expected {expected}; the other {dark}");
+    assert!((lit / expected - 1.0).abs() < 0.03 && dark < 0.01 * lit, "{lit}, expected {expected}; {dark}");
+}

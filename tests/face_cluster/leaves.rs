@@ -97,7 +97,7 @@ fn leaves_are_numbered_found_and_kept() {
 /// So much of the functions beyond the first that no channel's light on the mean plane is negative at nine places.
 fn limit_of(light: &[[DVec3; 3]], element: &FaceElement) -> f64 {
     let vector_area = (element.facing[4] - element.facing[5]).max(0.0);
-    if vector_area < 0.7 * element.area {
+    if vector_area < 0.8 * element.area {
         return 1.0;
     }
     let along = element.axis_z.as_dvec3();

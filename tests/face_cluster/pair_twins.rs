@@ -48,7 +48,7 @@ fn kept_vector(t: &Tables, e: &FaceElement, d: DVec3) -> DVec3 {
 }
 
 fn is_bent(e: &FaceElement) -> bool {
-    vector_area(e) < 0.7 * f64::from(e.area)
+    vector_area(e) < 0.8 * f64::from(e.area)
 }
 
 /// What stands for the vector area where that is small.
