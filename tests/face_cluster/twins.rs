@@ -280,22 +280,22 @@ fn products_over_faces(t: &Tables, e: &FaceElement, functions: usize) -> Vec<Vec
     sums
 }
 
-/// `fit_functions` of some nodes: what is laid through them by least squares, projected on so many functions over the faces:
-/// a row a function, a column a node; and the functions' means.
-fn fit_of(
+/// What is laid through some nodes by least squares, projected on so many functions over the faces (a row a function, a
+/// column a node); the functions' means; and whether these are the faces' or the nodes' own.
+fn laid_over(
     t: &Tables,
     e: &FaceElement,
     nodes: &[Vec3],
     (of, higher): (Range<usize>, f64),
     functions: usize,
-) -> (Vec<Vec<f64>>, Vec<f64>) {
+) -> (Vec<Vec<f64>>, Vec<f64>, bool) {
     let laid = [(16, 10), (6, 6), (4, 3), (1, 1)].into_iter().find(|(nodes, _)| of.len() >= *nodes).unwrap().1;
     let at: Vec<Vec<f64>> = of
         .clone()
         .map(|k| node_coordinates(t, e, nodes, k))
         .map(|uv| (0..laid).map(|k| basis(k, uv)).collect())
         .collect();
-    let weights: Vec<f64> = t.rules_of(e)[of].iter().map(|rule| f64::from(rule.weight)).collect();
+    let weights = rule_weights(t, e, of);
     let sum = |j: usize, k: usize| -> f64 { at.iter().zip(&weights).map(|(b, w)| w * b[j] * b[k]).sum() };
     let at_nodes: Vec<Vec<f64>> = (0..laid).map(|j| (0..laid).map(|k| sum(j, k)).collect()).collect();
     let fills = !is_flat(e) || e.area > 0.99 * 4.0 * e.half_extent.x * e.half_extent.y;
@@ -303,35 +303,52 @@ fn fit_of(
     let is_whole = e.area > 0.9999 * t.clusters[e.cluster as usize].area * scale * scale;
     let by_faces = !fills && is_whole && e.place_count > 1;
     let products = if by_faces { products_over_faces(t, e, laid) } else { at_nodes.clone() };
-    let ridge = |j: usize| {
-        if j == 0 {
-            0.0
-        } else if j < 3 || fills {
-            1e-3
-        } else {
-            higher
+    let ridge = |j: usize| match j {
+        0 => 0.0,
+        1..3 => 1e-3,
+        _ => {
+            if fills {
+                1e-3
+            } else {
+                higher
+            }
         }
     };
     let columns = |j: usize| at.iter().zip(&weights).map(move |(b, w)| w * b[j]);
-    let rows = (0..laid)
-        .map(|j| (0..laid).map(|k| at_nodes[j][k] + if j == k { ridge(j) } else { 0.0 }).chain(columns(j)).collect());
-    let laid_through = solved(rows.collect());
-    let projected = |j: usize, r: usize| -> f64 { (0..laid).map(|k| products[j][k] * laid_through[k][r]).sum() };
+    let square = |j: usize, k: usize| at_nodes[j][k] + if j == k { ridge(j) } else { 0.0 };
+    let rows = (0..laid).map(|j| (0..laid).map(|k| square(j, k)).chain(columns(j)).collect());
+    let through = solved(rows.collect());
+    let projected = |j: usize, r: usize| -> f64 { (0..laid).map(|k| products[j][k] * through[k][r]).sum() };
     let rows = (0..functions).map(|j| {
         let own = (0..functions).map(|k| products[j][k] + if j == k && j > 0 { 1e-5 } else { 0.0 });
         own.chain((0..at.len()).map(|r| projected(j, r))).collect()
     });
-    (solved(rows.collect()), products[0][..functions].to_vec())
+    (solved(rows.collect()), products[0][..functions].to_vec(), by_faces)
 }
 
-/// `fit_functions` of the receiver's nodes.
+fn rule_weights(t: &Tables, e: &FaceElement, of: Range<usize>) -> Vec<f64> {
+    t.rules_of(e)[of].iter().map(|rule| f64::from(rule.weight)).collect()
+}
+
+/// `weigh`: by how much each of some nodes makes the mean.
+fn mean_weights(t: &Tables, e: &FaceElement, nodes: &[Vec3], of: Range<usize>) -> Vec<f64> {
+    let (mut rows, _, by_faces) = laid_over(t, e, nodes, (of.clone(), 0.01), 1);
+    if by_faces { rows.remove(0) } else { rule_weights(t, e, of) }
+}
+
+/// `fit_functions` of the receiver's nodes: a row a function, a column a node; and the functions' means.
 pub fn fit(t: &Tables, e: &FaceElement, nodes: &[Vec3], functions: usize) -> (Vec<Vec<f64>>, Vec<f64>) {
-    fit_of(t, e, nodes, (0..t.receiver_nodes, 0.1), functions)
+    let (mut rows, means, _) = laid_over(t, e, nodes, (0..t.receiver_nodes, 0.1), functions);
+    for (r, weight) in mean_weights(t, e, nodes, 0..t.receiver_nodes).into_iter().enumerate() {
+        let said: f64 = rows.iter().zip(&means).map(|(row, mean)| mean * row[r]).sum();
+        rows[0][r] += weight - said;
+    }
+    (rows, means)
 }
 
 /// `fit_functions` of the shooter's nodes: what each is of all.
 pub fn weights(t: &Tables, e: &FaceElement, nodes: &[Vec3]) -> Vec<f64> {
-    fit_of(t, e, nodes, (t.receiver_nodes..nodes.len(), 0.01), 1).0.remove(0)
+    mean_weights(t, e, nodes, t.receiver_nodes..nodes.len())
 }
 
 /// Elements without what is hidden of them, and what they send themselves.

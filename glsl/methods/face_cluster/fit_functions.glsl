@@ -6,15 +6,18 @@
 // Added to the squares of functions that are not even, so that nodes that stand in a row, or at one place, say no more
 // than they can.
 const float RIDGE = 1e-3;
-// Of those that are not linear, on flat faces that do not fill their square: of a receiver's, some of whose nodes may be
-// in shadow, and a shooter's.
-const float RECEIVED_RIDGE = 0.1, SENT_RIDGE = 1e-2;
+// Of those that are not linear, on flat faces that do not fill their square: for means, and for what else is known of a
+// receiver, some of whose nodes may be in shadow.
+const float MEAN_RIDGE = 1e-2, SHAPE_RIDGE = 0.1;
 // Faces that are looked at, at most, for what functions are over all.
 const uint MOST_FACES = 64;
 const uint SQUARE = MOST_FUNCTIONS * MOST_FUNCTIONS;
 
 // Means of products of two functions over an element; and over its nodes, of which it becomes Cholesky's factor.
 float products[SQUARE], at_nodes[SQUARE];
+
+// By how much each node makes the mean.
+float mean_weights[RULE_NODES];
 
 // Where a node counts as standing: a flat element's where it is, others where the rule has them.
 vec2 node_coordinates(uint index, FaceElement e, uint k)
@@ -92,9 +95,29 @@ void lay_through(uint rows, float higher)
     factorise(at_nodes, rows);
 }
 
+// `mean_weights` of `count` nodes from `first` on: of what is laid through them. Others have those of the rule.
+void weigh(uint index, FaceElement e, uint first, uint count, uint rows, bool by_faces)
+{
+    uint rule = e.place_count == 1 ? RULE_NODES : 0;
+    if (by_faces) {
+        multiply_over_nodes(index, e, first, count, rows);
+        lay_through(rows, MEAN_RIDGE);
+    }
+    float column[MOST_FUNCTIONS];
+    [[dont_unroll]] for (uint r = first; r < first + count; ++r) {
+        mean_weights[r] = rules[rule + r].weight;
+        if (!by_faces) continue;
+        vec2 uv = node_coordinates(index, e, r);
+        [[dont_unroll]] for (uint k = 0; k < rows; ++k) column[k] = rules[rule + r].weight * basis(k, uv);
+        solve(at_nodes, rows, column);
+        mean_weights[r] = 0.0;
+        [[dont_unroll]] for (uint k = 0; k < rows; ++k) mean_weights[r] += products[k] * column[k];
+    }
+}
+
 // By how much what arrives at each receiver node makes each function: functions are laid through it by least squares,
-// and projected on those of irradiance over the faces; the mean of each function over the element; and by how much each
-// shooter node makes the mean of what is laid through them.                                    [Gobbetti2003 Eq. 7]
+// and projected on those of irradiance over the faces, with the mean that the nodes tell; the mean of each function over
+// the element; and by how much each shooter node makes the mean of what it sends.              [Gobbetti2003 Eq. 7]
 // Differs from [Gobbetti2003]: there all surfaces fill their squares, where this is the projection on orthonormal
 // functions and the rule's weights. Where faces do not, their nodes lie on borders, and would count those for too much.
 void fit_functions(uint index, FaceElement e, ClusterInstance inst, bool is_whole)
@@ -105,10 +128,12 @@ void fit_functions(uint index, FaceElement e, ClusterInstance inst, bool is_whol
     bool by_faces = !fills && is_whole && e.place_count > 1;
     float squares[SQUARE], column[S], own[S];
 
-    multiply_over_nodes(index, e, 0, RECEIVER_NODES, LAID_FUNCTIONS);
     if (by_faces) multiply_over_faces(e, inst, N, max(LAID_FUNCTIONS, SENT_FUNCTIONS));
-    else products = at_nodes;
-    lay_through(LAID_FUNCTIONS, fills ? RIDGE : RECEIVED_RIDGE);
+    weigh(index, e, 0, RECEIVER_NODES, LAID_FUNCTIONS, by_faces);
+    weigh(index, e, RECEIVER_NODES, SHOOTER_NODES, SENT_FUNCTIONS, by_faces);
+    multiply_over_nodes(index, e, 0, RECEIVER_NODES, LAID_FUNCTIONS);
+    if (!by_faces) products = at_nodes;
+    lay_through(LAID_FUNCTIONS, fills ? RIDGE : SHAPE_RIDGE);
     squares = products;
     [[dont_unroll]] for (uint j = 1; j < N; ++j) squares[j * S + j] += 1e-5;
     factorise(squares, N);
@@ -121,24 +146,13 @@ void fit_functions(uint index, FaceElement e, ClusterInstance inst, bool is_whol
             [[dont_unroll]] for (uint k = 0; k < LAID_FUNCTIONS; ++k) own[j] += products[j * S + k] * column[k];
         }
         solve(squares, N, own);
+        float said = 0.0;
+        [[dont_unroll]] for (uint j = 0; j < N; ++j) said += products[j] * own[j];
+        own[0] += mean_weights[r] - said;
         [[dont_unroll]] for (uint j = 0; j < N; ++j) fits[index * FITS + j * RECEIVER_NODES + r] = own[j];
     }
     [[dont_unroll]] for (uint j = 0; j < N; ++j) function_means[index * N + j] = products[j];
-
-    if (by_faces) {
-        multiply_over_nodes(index, e, RECEIVER_NODES, SHOOTER_NODES, SENT_FUNCTIONS);
-        lay_through(SENT_FUNCTIONS, SENT_RIDGE);
-    }
-    [[dont_unroll]] for (uint s = 0; s < SHOOTER_NODES; ++s) {
-        float weight = rules[rule + RECEIVER_NODES + s].weight;
-        if (by_faces) {
-            vec2 uv = node_coordinates(index, e, RECEIVER_NODES + s);
-            [[dont_unroll]] for (uint k = 0; k < SENT_FUNCTIONS; ++k) column[k] = weight * basis(k, uv);
-            solve(at_nodes, SENT_FUNCTIONS, column);
-            weight = 0.0;
-            [[dont_unroll]] for (uint k = 0; k < SENT_FUNCTIONS; ++k) weight += products[k] * column[k];
-        }
-        fits[index * FITS + N * RECEIVER_NODES + s] = weight;
-    }
+    [[dont_unroll]] for (uint s = 0; s < SHOOTER_NODES; ++s)
+        fits[index * FITS + N * RECEIVER_NODES + s] = mean_weights[RECEIVER_NODES + s];
 }
 #endif
