@@ -20,9 +20,9 @@ float cos_of_difference(float cos_a, float cos_b)
 }
 
 // Upper bound of the specular lobe times the receiver's cosine, over all directions within half angle `spread` of
-// `to_light`, sr^-1. Turning one of two directions by an angle turns the one halfway by half of it, divided by the cosine
+// `to_light`, sr^-1; that cosine is at most `cos_light`. Turning one of two directions by an angle turns the one halfway by half of it, divided by the cosine
 // between them.
-float largest_specular(Receiver r, vec3 to_light, float cos_spread)
+float largest_specular(Receiver r, vec3 to_light, float cos_spread, float cos_light)
 {
     Surface s = r.surface;
     if (!has_specular(s)) return 0.0;
@@ -31,8 +31,9 @@ float largest_specular(Receiver r, vec3 to_light, float cos_spread)
     float between = 0.5 * acos(clamp(dot(to_eye, to_light), -1.0, 1.0)) + 0.5 * spread;
     float cos_half = cos(min(between, 0.5 * PI));
     vec3 fresnel = schlick_fresnel(s, cos_half);
-    // The Smith term times the cosine is at most this.
-    float shadowing = 0.5 / smith_root(max(dot(s.normal, to_eye), 1e-6), s.alpha);
+    // The Smith term times the cosine grows with the cosine.
+    float cos_eye = max(dot(s.normal, to_eye), 1e-6);
+    float shadowing = 0.5 * cos_light / (cos_light * smith_root(cos_eye, s.alpha) + cos_eye * smith_root(cos_light, s.alpha));
 
     vec3 sum = to_eye + to_light;
     float squared = dot(sum, sum);
@@ -68,8 +69,11 @@ float largest_radiance(SenderNode node, Receiver r)
     float cos_sender = cos_of_difference(cos_axis, cos_spread);
     if (cos_sender <= 0.0) return 0.0;
 
-    vec3 albedo = r.surface.albedo;
-    float reflected = max(albedo.r, max(albedo.g, albedo.b)) / PI * cos_receiver + largest_specular(r, to_light, cos_spread);
+    // No direction reflects less than the normal's.
+    vec3 albedo = r.surface.albedo, f0 = r.surface.f0;
+    float passed = 1.0 - min(max(f0.r, max(f0.g, f0.b)), r.surface.f90);
+    float reflected = passed * max(albedo.r, max(albedo.g, albedo.b)) / PI * cos_receiver
+                      + largest_specular(r, to_light, cos_spread, cos_receiver);
     return node.power / PI * cos_sender * reflected / (nearest * nearest);
 }
 #endif
