@@ -22,9 +22,10 @@ fn texels_emit_and_reflect_as_plain_loops_do() {
     let context = TestContext::new();
     let random = &mut Random(3);
     for count in [1, 63, 65, 1009] {
-        let [emission, irradiance, albedo, before, indirect] = [(); 5].map(|()| vectors(random, count));
+        // One more than there are texels: it stays as it is.
+        let [emission, irradiance, albedo, before, indirect] = [(); 5].map(|()| vectors(random, count + 1));
         let upload = |values: &[Vec3]| context.upload("test/values", values).unwrap();
-        let (emission_buffer, emitted) = (upload(&emission), upload(&vec![Vec3::NAN; count]));
+        let (emission_buffer, emitted) = (upload(&emission), upload(&vec![Vec3::NAN; count + 1]));
         let (irradiance_buffer, albedo_buffer, reflected) = (upload(&irradiance), upload(&albedo), upload(&before));
         let (reflected_sum, indirect_sum) = (upload(&before), upload(&indirect));
         let texel_count = count as u32;
@@ -54,6 +55,8 @@ fn texels_emit_and_reflect_as_plain_loops_do() {
             assert!(near(indirect_sum[i], indirect[i] + irradiance[i]), "direct light is no indirect one");
             assert!(!near(sum[i], before[i] + once + 1e-3));
         }
+        let rest = [reflected[count], sum[count], indirect_sum[count]];
+        assert!(emitted[count].is_nan() && rest == [before[count], before[count], indirect[count]], "{rest:?}");
     }
 }
 
