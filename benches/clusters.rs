@@ -104,7 +104,7 @@ impl Row {
         let world = World::new(context, &scene, &geometry, &pose, &environment, false).map_err(|e| refused(&e))?;
         let bvh = Bvh::build(context, &positions, &geometry.triangles).map_err(|e| refused(&e))?;
         let stage = stage((&scene, &geometry, &pose), (&positions, bounds), (&world, &bvh, &environment));
-        // As many bounces of all sizes: some would end one earlier.
+        // As many bounces of all sizes, whatever each leaves unshot.
         let settings = Settings { convergence: 0.0, ..Settings::default() };
         let method = FaceClusters::prepare(context, &stage, settings).unwrap();
         let view = View::of_scene(&scene, &pose, None, Some(bounds), SIZE).unwrap();
