@@ -79,6 +79,28 @@ fn changes_leave_no_trace_of_what_was_before() {
     assert_eq!(context.validation_messages(), [""; 0]);
 }
 
+/// Without bounces glossy elements show nothing of the bounces that were there before.
+#[test]
+fn fewer_bounces_leave_nothing_of_more() {
+    let context = context();
+    for method in ["explicit-visibility", "implicit-visibility", "antiradiance", "surface-shadow-maps", "face-cluster"]
+    {
+        let scene = "builtin:cornell-box --edit material:0.roughness=0.3 --edit material:0.metallic=1";
+        let coarse = match method {
+            "surface-shadow-maps" => "--set atlas_resolution=40 --set map_resolution=8 --set keep_maps=false",
+            "face-cluster" => "--set threshold=0.001",
+            _ => "",
+        };
+        let with = |bounces: u32| format!("{scene} --method {method} {coarse} --bounces {bounces}");
+        let mut engine = Engine::new(&context);
+        let more = pixels(&context, &mut engine, &with(2));
+        let fewer = pixels(&context, &mut engine, &with(0));
+        assert!(fewer == pixels(&context, &mut Engine::new(&context), &with(0)), "{method}: not a new engine's");
+        assert!(fewer != more, "{method}: bounces are seen");
+    }
+    assert_eq!(context.validation_messages(), [""; 0]);
+}
+
 #[test]
 fn an_interrupted_picture_is_made_whole_by_the_next_request() {
     struct Never;

@@ -10,7 +10,7 @@ use crate::stages::direction_bins::DeviceBins;
 use crate::stages::elements::Elements;
 use crate::stages::hierarchy::{Hierarchy, NONE};
 use crate::stages::world::World;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Bins of a thread, in `reflect_glossy.comp`.
 const SENT_BINS: u32 = 8;
@@ -214,24 +214,9 @@ impl Antiradiance {
             Lens::Orthographic { .. } => (-view.forward).extend(0.0),
         };
         let (tables, gloss) = (&self.tables, &self.tables.gloss);
-        gloss.arrive(recorder, tables, &self.hierarchy, &self.bins, false, self.bounced);
-        let pass = passes::ToEye {
-            glossy_leaves: &gloss.leaves,
-            leaves: &self.hierarchy.leaves,
-            gloss: &gloss.lobes,
-            cosine_norms: &tables.cosine_norms,
-            bin_directions: &self.bins.directions,
-            arrived: &gloss.arrived,
-            positions: &world.positions,
-            albedo: &self.elements.albedo,
-            irradiance: self.indirect_irradiance(),
-            members: &self.hierarchy.members,
-            back_elements: &self.elements.back_elements,
-            shown,
-            constants: passes::ToEyeConstants { words: Tables::words(tables.half) as u32, bin_count: tables.bin_count },
-            params: passes::ToEyeParams { eye: eye.to_array(), glossy_count: gloss.count },
-        };
-        recorder.dispatch(&pass, gloss.count);
+        if self.has_arrived {
+            self.look_at_indirect(recorder, world, eye);
+        }
         let (elements, emitters) = (&self.elements, &self.emitters);
         let pass = passes::DirectToEye {
             glossy_leaves: &gloss.leaves,
@@ -258,6 +243,29 @@ impl Antiradiance {
         recorder.dispatch(&pass, gloss.count);
         self.stand_ins.take_over(recorder, shown);
         self.stand_ins.take_over(recorder, &self.state.shown_direct);
+    }
+
+    /// Light that came along links.
+    fn look_at_indirect(&self, recorder: &mut Recorder<'_>, world: &World, eye: Vec4) {
+        let (tables, gloss) = (&self.tables, &self.tables.gloss);
+        gloss.arrive(recorder, tables, &self.hierarchy, &self.bins, false, self.bounced);
+        let pass = passes::ToEye {
+            glossy_leaves: &gloss.leaves,
+            leaves: &self.hierarchy.leaves,
+            gloss: &gloss.lobes,
+            cosine_norms: &tables.cosine_norms,
+            bin_directions: &self.bins.directions,
+            arrived: &gloss.arrived,
+            positions: &world.positions,
+            albedo: &self.elements.albedo,
+            irradiance: self.indirect_irradiance(),
+            members: &self.hierarchy.members,
+            back_elements: &self.elements.back_elements,
+            shown: &self.state.shown,
+            constants: passes::ToEyeConstants { words: Tables::words(tables.half) as u32, bin_count: tables.bin_count },
+            params: passes::ToEyeParams { eye: eye.to_array(), glossy_count: gloss.count },
+        };
+        recorder.dispatch(&pass, gloss.count);
     }
 
     /// What [`Self::look`] left of direct and indirect light, W/m2 per element.

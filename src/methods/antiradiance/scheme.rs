@@ -84,7 +84,8 @@ impl Antiradiance {
         recorder.fill(&self.tables.linked, 0);
         recorder.fill(&self.tables.gloss.base, 0);
         let has_environment = !self.tables.is_environment_black;
-        if self.emitters.plan.linked_parts == 0 && !has_environment {
+        self.has_arrived = self.emitters.plan.linked_parts > 0 || has_environment;
+        if !self.has_arrived {
             return Ok(recorder.submit()?);
         }
         recorder.scope("linked direct light", |recorder| {
@@ -117,6 +118,7 @@ impl Antiradiance {
             return Ok(recorder.submit()?);
         }
         recorder.submit()?;
+        self.has_arrived = true;
         match self.settings.scheme {
             Scheme::Symmetric => self.iterate(context, watch),
             Scheme::Asymmetric => {
