@@ -266,3 +266,47 @@ fn the_eye_sees_sampled_emitters_in_lobes() {
     assert!(difference(&found, &expected) < 0.02);
     assert!(difference(&even, &expected) > 0.1, "the lobe makes a difference");
 }
+
+/// A plate that sends along links shines in the floor as what arrived bin by bin says, with bounces as without.
+#[test]
+fn the_eye_sees_linked_emitters_in_lobes() {
+    let context = TestContext::new();
+    let fixture = glossy_fixture(&context, metal_floor(true));
+    let linked = Settings { emitters: EmitterChoice::Linked, undershoot: 1e9, ..settings(128) };
+    let mut method = prepare(&context, &fixture, linked);
+    let view = View::towards(Vec3::new(0.5, 1.5, 2.5), Vec3::ZERO, 0.8, UVec2::new(64, 64));
+    let direct = solve(&context, &mut method, &fixture, 0).direct;
+    // Without bounces the tables hold what arrived directly.
+    let state = State::of(&context, &method);
+    let shown = |method: &Antiradiance| {
+        let mut recorder = context.recorder("test").unwrap();
+        method.look(&mut recorder, &fixture.world, &view);
+        recorder.submit().unwrap();
+        let (direct, indirect) = method.shown_irradiance();
+        (context.download(direct).unwrap(), context.download(indirect).unwrap())
+    };
+    let (without, none) = shown(&method);
+    solve(&context, &mut method, &fixture, 2);
+    let (with, some) = shown(&method);
+    assert!(with == without, "bounces change direct light");
+    let power = |light: &[Vec3]| light.iter().map(|e| e.x).sum::<f32>();
+    assert!(power(&none) == 0.0 && power(&some) > 0.0);
+
+    let positions = context.download(&fixture.world.positions).unwrap();
+    let albedo = context.download(&method.elements().albedo).unwrap();
+    let (mut found, mut expected, mut even) = (Vec::new(), Vec::new(), Vec::new());
+    for &leaf in &state.glossy {
+        let (own, lobe) = (&state.leaves[leaf as usize], &state.lobes[leaf as usize]);
+        let element = own.element as usize;
+        let eye = (view.position - positions[element]).as_dvec3().normalize();
+        let (diffuse, f0, cos_eye) = (albedo[element].as_dvec3(), lobe.f0.as_dvec3(), own.normal.as_dvec3().dot(eye));
+        let sent = diffuse_albedo(diffuse, f0, 1.0, cos_eye) * direct[element].as_dvec3()
+            + PI * state.radiance(leaf as usize, eye, 1e9);
+        expected.push(sent / even_albedo(diffuse, f0, 1.0, lobe.alpha.into(), cos_eye).max(DVec3::splat(1e-4)));
+        found.push(without[element]);
+        even.push(direct[element]);
+    }
+    let [lobes, evenly] = [&found, &even].map(|light| difference(light, &expected));
+    println!("linked light in lobes differs by {lobes:.1e}, even light by {evenly:.1e}");
+    assert!(lobes < 1e-3 && evenly > 0.1, "{lobes}, {evenly}");
+}

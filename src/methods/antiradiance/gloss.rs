@@ -27,7 +27,9 @@ pub struct Gloss {
     /// Per glossy leaf and bin: what the lobe sends, W m^-2 sr^-1.
     pub specular: Buffer<Vec3>,
     /// Per glossy leaf and bin, words as in [`Tables`]: radiance that arrived last.
-    arrived: Buffer<u64>,
+    pub(super) arrived: Buffer<u64>,
+    /// The same of direct light that came along links.
+    pub(super) arrived_directly: Buffer<u64>,
     /// What is sent of direct light that came along links, alone.
     pub base: Buffer<Vec3>,
 }
@@ -62,9 +64,11 @@ impl Gloss {
         let mut glossy_of_leaf = vec![NONE; leaf_count as usize];
         glossy.iter().zip(0..).for_each(|(&leaf, index)| glossy_of_leaf[leaf as usize] = index);
         let entries = glossy.len() * bin_count as usize;
+        let words = entries * Tables::words(half) as usize;
         Ok(Self {
             count: glossy.len() as u32,
-            arrived: context.buffer("antiradiance/arrived at glossy leaves", entries * Tables::words(half) as usize)?,
+            arrived: context.buffer("antiradiance/arrived at glossy leaves", words)?,
+            arrived_directly: context.buffer("antiradiance/arrived directly at glossy leaves", words)?,
             leaves: context.upload("antiradiance/glossy leaves", &glossy)?,
             glossy_of_leaf: context.upload("antiradiance/glossy of leaf", &glossy_of_leaf)?,
             specular: context.buffer("antiradiance/specular", entries)?,
@@ -214,7 +218,7 @@ impl Antiradiance {
             Lens::Orthographic { .. } => (-view.forward).extend(0.0),
         };
         let (tables, gloss) = (&self.tables, &self.tables.gloss);
-        if self.has_arrived {
+        if self.has_bounced {
             self.look_at_indirect(recorder, world, eye);
         }
         let (elements, emitters) = (&self.elements, &self.emitters);
@@ -233,11 +237,18 @@ impl Antiradiance {
             back_elements: &elements.back_elements,
             irradiance: self.direct_irradiance(),
             shown: &self.state.shown_direct,
-            constants: passes::DirectToEyeConstants { bin_count: tables.bin_count },
+            cosine_norms: &tables.cosine_norms,
+            bin_directions: &self.bins.directions,
+            arrived: &gloss.arrived_directly,
+            constants: passes::DirectToEyeConstants {
+                words: Tables::words(tables.half) as u32,
+                bin_count: tables.bin_count,
+            },
             params: passes::DirectToEyeParams {
                 eye: eye.to_array(),
                 glossy_count: gloss.count,
                 sample_count: emitters.plan.samples.len() as u32,
+                has_linked: u32::from(self.has_linked_light()),
             },
         };
         recorder.dispatch(&pass, gloss.count);

@@ -118,8 +118,8 @@ pub struct Antiradiance {
     tables: Tables,
     state: State,
     residuals: Vec<Residual>,
-    /// Whether light went along links in this solution: if not, the tables hold that of an earlier one.
-    has_arrived: bool,
+    /// Whether the tables hold bounces of this solution: without any they hold direct light, or another solution.
+    has_bounced: bool,
     /// Reflected light so far, of the sources' light.
     bounced: f32,
     /// Power of the sources' light, W.
@@ -206,7 +206,7 @@ impl Antiradiance {
             report: Report::new(&settings, &elements, &emitters, &hierarchy, &links, &transfers),
             state: State::new(context, &elements, stage.world.light_count)?,
             residuals: Vec::new(),
-            has_arrived: false,
+            has_bounced: false,
             bounced: 1.0,
             source_power: 0.0,
             damping: settings.damping,

@@ -84,8 +84,7 @@ impl Antiradiance {
         recorder.fill(&self.tables.linked, 0);
         recorder.fill(&self.tables.gloss.base, 0);
         let has_environment = !self.tables.is_environment_black;
-        self.has_arrived = self.emitters.plan.linked_parts > 0 || has_environment;
-        if !self.has_arrived {
+        if !self.has_linked_light() {
             return Ok(recorder.submit()?);
         }
         recorder.scope("linked direct light", |recorder| {
@@ -101,7 +100,13 @@ impl Antiradiance {
         let gloss = &self.tables.gloss;
         gloss.reflect(&mut recorder, &self.tables, &self.hierarchy, &self.bins, has_environment, 1.0);
         recorder.copy(&gloss.specular, &gloss.base);
+        recorder.copy(&gloss.arrived, &gloss.arrived_directly);
         Ok(recorder.submit()?)
+    }
+
+    /// Whether emitters or the environment send along links.
+    pub(super) fn has_linked_light(&self) -> bool {
+        self.emitters.plan.linked_parts > 0 || !self.tables.is_environment_black
     }
 
     /// Indirect light of `bounces` bounces after the sources, into `irradiance`.     [Dachsbacher2007 2.2]
@@ -113,12 +118,12 @@ impl Antiradiance {
     ) -> Result<(), AntiradianceError> {
         let mut recorder = context.recorder("antiradiance")?;
         self.sources(&mut recorder, false);
-        if bounces == 0 {
+        self.has_bounced = bounces > 0;
+        if !self.has_bounced {
             recorder.fill(&self.tables.irradiance, 0);
             return Ok(recorder.submit()?);
         }
         recorder.submit()?;
-        self.has_arrived = true;
         match self.settings.scheme {
             Scheme::Symmetric => self.iterate(context, watch),
             Scheme::Asymmetric => {
