@@ -256,7 +256,7 @@ impl Antiradiance {
         self.stand_ins.take_over(recorder, &self.state.shown_direct);
     }
 
-    /// Light that came along links.
+    /// Indirect light: what arrived in the last step.
     fn look_at_indirect(&self, recorder: &mut Recorder<'_>, world: &World, eye: Vec4) {
         let (tables, gloss) = (&self.tables, &self.tables.gloss);
         gloss.arrive(recorder, tables, &self.hierarchy, &self.bins, false, self.bounced);

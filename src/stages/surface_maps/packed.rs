@@ -83,9 +83,13 @@ impl Packing {
 impl PackedRuns {
     /// The smallest, but marked where that takes hardly more.
     pub fn best(maps: &CompressedMaps) -> Self {
-        let [marked, small, large] = RunLayout::ALL.map(|layout| Self::of(maps, layout));
+        let [small, large] = [RunLayout::Small, RunLayout::Large].map(|layout| Self::of(maps, layout));
         let searched = if small.size_bytes() < large.size_bytes() { small } else { large };
-        if marked.size_bytes() <= searched.size_bytes() + searched.size_bytes() / WORTH { marked } else { searched }
+        let most = searched.size_bytes() + searched.size_bytes() / WORTH;
+        // Of long runs marks alone may take many times as much: they are not made to be thrown away.
+        let marks = 16 * maps.pixel_count() as u64 * u64::from(maps.place_count.div_ceil(MARKED_PLACES));
+        let marked = (marks <= most).then(|| Self::of(maps, RunLayout::Marked));
+        marked.filter(|marked| marked.size_bytes() <= most).unwrap_or(searched)
     }
 
     pub fn of(maps: &CompressedMaps, layout: RunLayout) -> Self {
