@@ -7,6 +7,7 @@ mod fixture;
 mod glossy;
 mod hidden;
 mod kernels;
+mod look_ups;
 mod maps;
 mod moving;
 mod outside;

@@ -346,5 +346,9 @@ impl<'c> Engine<'c> {
 mod tests;
 
 #[cfg(test)]
+#[path = "soak_scenes.rs"]
+mod soak_scenes;
+
+#[cfg(test)]
 #[path = "soak_tests.rs"]
 mod soak_tests;

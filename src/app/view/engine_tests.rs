@@ -16,19 +16,29 @@ fn context() -> Context {
 }
 
 fn request(options: &str) -> RenderRequest {
-    let scene = if options.contains("builtin:") { "" } else { "builtin:office" };
+    try_request(options).unwrap()
+}
+
+fn try_request(options: &str) -> Result<RenderRequest, AppError> {
+    let names_scene = options.contains("builtin:") || options.contains(".glb");
+    let scene = if names_scene { "" } else { "builtin:office" };
     let unsaid = PICTURE.iter().filter(|(name, _)| !options.contains(name));
     let unsaid: String = unsaid.map(|(name, value)| format!("{name} {value} ")).collect();
     let line = format!("linklight view {scene} {unsaid} {options}");
     let Command::View(args) = Cli::try_parse_from(line.split_whitespace()).unwrap().command else { panic!("no view") };
-    RenderRequest::of_picture(&args.picture, Output { path: "a.png".into(), format: Format::Png }).unwrap()
+    RenderRequest::of_picture(&args.picture, Output { path: "a.png".into(), format: Format::Png })
 }
 
-pub(super) fn pixels(context: &Context, engine: &mut Engine<'_>, options: &str) -> Vec<Vec3> {
-    let film = engine.render(&request(options), &Unwatched).unwrap();
+fn pixels(context: &Context, engine: &mut Engine<'_>, options: &str) -> Vec<Vec3> {
+    try_pixels(context, engine, options).unwrap()
+}
+
+/// Direct light of all pixels, then what is indirect; or why there is no picture with these options.
+pub(super) fn try_pixels(context: &Context, engine: &mut Engine<'_>, options: &str) -> Result<Vec<Vec3>, AppError> {
+    let film = engine.render(&try_request(options)?, &Unwatched)?;
     let mut pixels = context.download(&film.direct).unwrap();
     pixels.extend(context.download(&film.indirect).unwrap());
-    pixels
+    Ok(pixels)
 }
 
 #[test]

@@ -1,16 +1,22 @@
 //! Long work with random edits: pictures stay those of a new engine, and memory stays what it was.
 //!
 //! `LINKLIGHT_SOAK_FRAMES=10000 LINKLIGHT_SOAK_SCENES=dancer,tea-room LINKLIGHT_SOAK_SEED=7 cargo test --release --lib soak
-//! -- --nocapture` is the long form; methods by LINKLIGHT_SOAK_METHODS, and LINKLIGHT_SOAK_ELEMENTS=300 makes frames of methods
-//! with elements short. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks at every access of every shader (its instrumented
-//! shaders take a minute a method to compile): none reaches beyond what is bound.
+//! -- --nocapture` is the long form; methods by LINKLIGHT_SOAK_METHODS. What makes frames short: LINKLIGHT_SOAK_CELL=0.25
+//! for coarse copies of the scenes, with a vertex for each so many metres, and LINKLIGHT_SOAK_ELEMENTS=300 for methods with
+//! elements. LINKLIGHT_SOAK_PASSES=20 lists the passes that took longest. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks
+//! at every access of every shader (its instrumented shaders take a minute a method to compile): none reaches beyond what
+//! is bound.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::tests::pixels;
+use super::soak_scenes::coarse;
+use super::tests::try_pixels;
 use super::*;
 use crate::gpu::Options;
-use crate::methods::METHODS;
+use crate::methods::settings::Kind;
+use crate::methods::{METHODS, Method};
+use crate::scene::builtin::{self, Source};
 
 /// Small enough for every method, and enough for what its settings cost.
 const SMALL: [(&str, &str); 4] = [
@@ -19,8 +25,8 @@ const SMALL: [(&str, &str); 4] = [
         "--set atlas_resolution=40 --set map_resolution=8 --set keep_maps=false --set light_samples=2",
     ),
     ("explicit-visibility", "--set rays_per_element=64"),
-    ("implicit-visibility", "--set bins=8"),
-    ("face-cluster", "--set threshold=0.001"),
+    ("implicit-visibility", "--set bins=4"),
+    ("face-cluster", "--set threshold=0.004"),
 ];
 
 /// SplitMix64.
@@ -52,12 +58,14 @@ struct State {
     intensity: Option<f64>,
     roughness: Option<f64>,
     moved: Option<f64>,
+    setting: Option<(&'static str, &'static str)>,
+    display: Option<&'static str>,
 }
 
 impl State {
     /// One of them changes; what is made anew from the ground rarely.
-    fn change(&mut self, random: &mut Random, has_lights: bool) {
-        match random.below(20) {
+    fn change(&mut self, random: &mut Random, has_lights: bool, settings: &[(&'static str, &'static str)]) {
+        match random.below(24) {
             0..6 => self.seconds = 4.0 * random.share(),
             6..9 => self.albedo = Some([random.share(), random.share(), random.share()]),
             9..12 if has_lights => self.intensity = Some(2.0 * random.share()),
@@ -66,6 +74,8 @@ impl State {
             17 => self.size = random.below(2),
             18 => self.roughness = Some(random.share()),
             19 => self.moved = Some(random.share() / 10.0),
+            20..22 => self.setting = settings.get(random.below(1 + settings.len() as u64) as usize).copied(),
+            22 => self.display = [None, Some("vertex"), Some("final-gather")][random.below(3) as usize],
             _ => *self = Self::default(),
         }
     }
@@ -88,8 +98,34 @@ impl State {
         if let Some(moved) = self.moved {
             options += &format!(" --edit node:6.move={moved},0,0");
         }
+        if let Some((key, value)) = self.setting {
+            options += &format!(" --set {key}={value}");
+        }
+        if let Some(display) = self.display {
+            options += &format!(" --display {display}");
+        }
         options
     }
+}
+
+/// What a method's switches and choices may be set to.
+fn settings_of(method: &Method) -> Vec<(&'static str, &'static str)> {
+    let specs = method.specs().into_iter();
+    specs
+        .flat_map(|spec| match spec.kind {
+            Kind::Bool => vec![(spec.name, "false"), (spec.name, "true")],
+            Kind::Choice { values } => values.iter().map(|value| (spec.name, value.name)).collect(),
+            _ => Vec::new(),
+        })
+        .collect()
+}
+
+/// A picture's pixels, or why it is refused.
+fn picture(context: &Context, engine: &mut Engine<'_>, options: &str) -> Result<Vec<Vec3>, String> {
+    try_pixels(context, engine, options).map_err(|error| {
+        assert!(!context.is_lost(), "{options}: {error}");
+        error.to_string()
+    })
 }
 
 fn variable(name: &str) -> Option<String> {
@@ -115,58 +151,90 @@ fn random_edits_leave_pictures_and_memory_as_they_were() {
     let scenes = variable("LINKLIGHT_SOAK_SCENES").unwrap_or_else(|| "cornell-box".into());
     let methods = variable("LINKLIGHT_SOAK_METHODS");
     let chosen = |key: &str| methods.as_ref().is_none_or(|list| list.split(',').any(|name| name == key));
-    for scene in scenes.split(',') {
+    let folder = tempfile::tempdir().unwrap();
+    for name in scenes.split(',') {
+        let mut scene = format!("builtin:{name}");
+        if let Some(cell) = variable("LINKLIGHT_SOAK_CELL") {
+            let Ok(Source::File(glb)) = builtin::resolve(name) else { panic!("{name} is not kept as a file") };
+            let file = folder.path().join(format!("{name}.glb"));
+            std::fs::write(&file, coarse(glb, cell.parse().unwrap())).unwrap();
+            scene = file.display().to_string();
+        }
         for method in METHODS.iter().filter(|method| chosen(method.key)) {
-            soak(scene, method.key, frames, seed);
+            soak(&scene, method, frames, seed);
         }
     }
 }
 
-fn soak(scene: &str, method: &str, frames: u64, seed: u64) {
+fn soak(scene: &str, method: &Method, frames: u64, seed: u64) {
+    let (choices, method) = (settings_of(method), method.key);
     let gpu_assisted = variable("LINKLIGHT_SOAK_ASSISTED").is_some();
     let context = Context::new(Options { validation: true, gpu_assisted, ..Options::default() }).unwrap();
     let settings = SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings);
     // The tea room has 1,746 charts.
-    let atlas = if scene == "tea-room" { "atlas_resolution=64" } else { "atlas_resolution=40" };
+    let atlas = if scene.contains("tea-room") { "atlas_resolution=64" } else { "atlas_resolution=40" };
     let settings = settings.replace("atlas_resolution=40", atlas);
     let elements = variable("LINKLIGHT_SOAK_ELEMENTS")
         .filter(|_| !["path-tracing", "surface-shadow-maps", "face-cluster"].contains(&method))
         .map_or(String::new(), |count| format!("--elements {count}"));
-    let asked = |state: &State| format!("builtin:{scene} --method {method} {elements} {settings} {}", state.options());
+    let asked = |state: &State| format!("{scene} --method {method} {elements} {settings} {}", state.options());
     let mut engine = Engine::new(&context);
     let (mut state, mut random) = (State { bounces: 1, ..State::default() }, Random(seed));
     let first_state = state.clone();
-    let first = pixels(&context, &mut engine, &asked(&state));
+    let is_long = variable("LINKLIGHT_SOAK_FRAMES").is_some();
+    let first = picture(&context, &mut engine, &asked(&state));
+    assert!(first.is_ok(), "{scene} {method}: {first:?}");
+    let mut refused = 0;
     let has_lights = !engine.stage().unwrap().pose.lights.is_empty();
     let (mut levels, mut host, start) = (Vec::new(), Vec::new(), Instant::now());
-    let every = (frames / 4).max(1);
+    let mut times = BTreeMap::<&str, u64>::new();
+    let every = if frames < 400 { (frames / 4).max(1) } else { frames / 100 };
     for frame in 1..=frames {
-        state.change(&mut random, has_lights);
+        state.change(&mut random, has_lights, &choices);
         let options = asked(&state);
-        let picture = pixels(&context, &mut engine, &options);
-        assert!(picture.iter().all(|pixel| pixel.is_finite()), "{options}: not finite in frame {frame}");
+        let pixels = picture(&context, &mut engine, &options);
+        match &pixels {
+            Ok(pixels) => assert!(pixels.iter().all(|p| p.is_finite()), "{options}: not finite in frame {frame}"),
+            Err(_) => refused += 1,
+        }
         // As the window does.
-        context.take_records();
+        for record in context.take_records() {
+            *times.entry(record.name).or_default() += record.end_ns.saturating_sub(record.start_ns);
+        }
         if frame % every == 0 {
-            let fresh = pixels(&context, &mut Engine::new(&context), &options);
-            assert!(picture == fresh, "{options}: frame {frame} of seed {seed} is not a new engine's");
-            assert!(
-                pixels(&context, &mut engine, &asked(&first_state)) == first,
-                "{options}: frame {frame}, then back"
-            );
+            let fresh = picture(&context, &mut Engine::new(&context), &options);
+            assert!(pixels == fresh, "{options}: frame {frame} of seed {seed} is not a new engine's");
+            let back = picture(&context, &mut engine, &asked(&first_state));
+            assert!(back == first, "{options}: frame {frame} of seed {seed}, then back");
             levels.push(bytes(&context));
             host.extend(resident());
+            if is_long {
+                println!(
+                    "{scene} {method}: {frame} frames in {:.0?}, {} bytes at rest",
+                    start.elapsed(),
+                    bytes(&context)
+                );
+            }
         }
     }
     println!(
-        "{scene} {method}: {frames} frames in {:.0?}, bytes at rest {levels:?}, MiB of the process {host:?}",
+        "{scene} {method}: {frames} frames ({refused} refused) in {:.0?}, bytes at rest {levels:?}, MiB of the process {host:?}",
         start.elapsed()
     );
-    // By the second sample everything that is kept for further use was made.
-    assert!(levels[1..].iter().all(|level| level == &levels[1]), "{scene} {method}: memory grows: {levels:?}");
+    let mut times: Vec<_> = times.into_iter().collect();
+    times.sort_by_key(|(_, nanoseconds)| std::cmp::Reverse(*nanoseconds));
+    let listed = variable("LINKLIGHT_SOAK_PASSES").map_or(0, |text| text.parse().unwrap());
+    for (name, nanoseconds) in times.into_iter().take(listed) {
+        println!("{:8.2} ms a frame: {name}", nanoseconds as f64 / 1e6 / frames as f64);
+    }
+    // What is kept for further use grows to what the poses need at most, which long work has met in its first half.
+    let (early, late) = levels.split_at(levels.len() / 2);
+    let (early, late) = (early.iter().max().unwrap(), late.iter().max().unwrap());
+    let allowed = if is_long { early + early / 100 } else { *early };
+    assert!(*late <= allowed, "{scene} {method}: memory grows: {levels:?}");
     // What the allocator keeps varies a little; other tests of the process make it vary more.
-    let is_alone = variable("LINKLIGHT_SOAK_FRAMES").is_some();
-    let grows = is_alone && host.iter().any(|level| *level > host[1] + 64);
+    let (early, late) = host.split_at(host.len() / 2);
+    let grows = is_long && late.iter().max() > early.iter().max().map(|most| most + 32).as_ref();
     assert!(!grows, "{scene} {method}: the process grows: {host:?} MiB");
     // The layer says first what it switches on for itself.
     let is_setting = |m: &String| m.contains("layer settings provided") || m.contains("is adjusting settings");
