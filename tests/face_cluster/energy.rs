@@ -191,6 +191,26 @@ fn no_light_comes_into_the_core_of_a_small_shadow() {
     assert!(faces > 10 && dark < 0.05 * lit, "{dark} W/m2 in the core, {lit} on the floor");
 }
 
+/// Errors are judged by the light that strikes surfaces: a lamp that shines into the void makes nothing coarser.
+#[test]
+fn light_that_strikes_nothing_judges_nothing() {
+    let context = TestContext::new();
+    let board = (Vec3::Z * 0.4, Vec3::X * 0.4);
+    let below = |lost: f32| {
+        let mut scene = below_a_lamp(board, Vec3::Y * 0.2, 2.0);
+        scene.materials.push(Material { emission: Vec3::splat(lost), ..one_sided(0.0) });
+        let upwards = parallelogram(Vec3::new(-1.0, 2.1, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X, 4, 3);
+        scene.meshes[0].primitives.push(upwards);
+        let fixture = Fixture::new(&context, scene, None);
+        let method = fixture.solve(&context, Settings::default(), 1);
+        let report = method.report();
+        println!("beside {lost} W/m2/sr: {} transfers, {} elements", report.transfers(), report.elements);
+        report.transfers() as f64
+    };
+    let (alone, beside) = (below(0.0), below(10.0));
+    assert!((beside / alone - 1.0).abs() < 0.2, "{alone} transfers without the other lamp, {beside} with it");
+}
+
 /// A bar that hangs close below a lamp is lit by all of it that it sees, however coarse the threshold: neither takes the
 /// other for what its nodes see.
 #[test]

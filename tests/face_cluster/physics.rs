@@ -41,7 +41,8 @@ fn form_factors_of_plates() {
                 errors.push(error);
                 finest = count;
             }
-            assert!(errors[1] < 4e-3 && errors[1] < errors[0], "{name}, {basis:?}: {errors:?}");
+            // Below 2e-4 errors of either sign meet by chance.
+            assert!(errors[1] < 4e-3 && errors[1] < errors[0].max(2e-4), "{name}, {basis:?}: {errors:?}");
             transfers.push(finest);
         }
         // All faces with all faces, the constant basis is classical: within 1e-3.

@@ -29,11 +29,13 @@
 //! flat element's square, each for as much as makes their sums right over its faces, where these do not fill it;
 //! flat shooters of up to eight faces are measured exactly unless they are far; what lies inside other closed
 //! bodies is no surface: it neither takes light nor weighs in a cluster's mean;
-//! errors are judged against the light they belong to; what has faces that look many ways is split also where its power
-//! is too small to matter, since one normal would leave half of them dark; what is near a large one is bounded by what that
-//! may fill of the hemisphere, since its nodes alone say too little; rays decide whether a pair is split and others measure
-//! what is let pass, one a node unless told otherwise, drawn by what would pass along them; the larger of
-//! both is split, but where an emitter's light is blocked the receiver, until it is a quarter as wide;
+//! errors are judged against the light they belong to, as much of it as strikes surfaces, which a coarse look measures
+//! where that light is kept;
+//! what has faces that look many ways is split also where its power is too small to matter, since one normal would leave
+//! half of them dark; what is near a large one is bounded by what that may fill of the hemisphere, since its nodes alone
+//! say too little; rays decide whether a pair is split and others measure what is let pass, one a node unless told
+//! otherwise, drawn by what would pass along them; the larger of both is split, but where an emitter's light is blocked
+//! the receiver, until it is a quarter as wide;
 //! transfers are made with the projected area expected between its bounds, not the lower bound, and what faces get beyond
 //! their vector area lies along the mean normal; (1 - F_ii) is not applied to what is reflected: F_ii of it is shot at
 //! the cluster itself, F_ii being what its nodes see of each other, below the bound; while light is shot, inner elements have room for
@@ -88,8 +90,8 @@ crate::choice! {
 crate::settings! {
     /// What face-cluster radiosity lets the user choose.
     pub struct Settings {
-        /// Error of a transfer that is let pass, as a share of the power of the light it belongs to: emitted, distant,
-        /// punctual, or reflected once.
+        /// Error of a transfer that is let pass, as a share of what strikes surfaces of the light it belongs to: emitted,
+        /// distant, or reflected once; of punctual light, which is shown per pixel, as a share of what is sent.
         threshold: f32 = 1e-5, range 1e-9..=1.0, paper "1e-5 of all emitted power";
         /// Light at which a receiver or shooter whose faces look many ways is split whatever its power, as a share of the
         /// mean irradiance that its pass of light would give all surfaces.

@@ -40,12 +40,19 @@ pub(super) struct LightPass<'a> {
     pub name: String,
     pub shooters: Shooters<'a>,
     pub kept: Kept,
-    /// W, of a transfer's error.
+    /// W, sent.
+    pub power: Vec3,
+    /// W/m2, the most that can arrive anywhere.
+    pub most: f32,
+}
+
+/// What a pass of light may get wrong.
+#[derive(Clone, Copy)]
+pub(super) struct Tolerance {
+    /// W, of a transfer.
     pub threshold: f32,
     /// W/m2, that a bent receiver may get as a whole.
     pub bent_light: f32,
-    /// W/m2, the most that can arrive anywhere.
-    pub most: f32,
 }
 
 impl FaceClusters {
@@ -53,17 +60,12 @@ impl FaceClusters {
     /// shown: call [`Self::locate`].
     pub fn solve(&mut self, context: &Context, stage: &Stage<'_>, bounces: u32) -> Result<(), FaceClusterError> {
         let clock = Instant::now();
-        let self_threshold = self.settings.threshold;
         self.report.iterations.clear();
         self.most_light = 0.0;
         self.start(context, stage)?;
         let [low, high] = stage.bounds;
         let diagonal = (high - low).length().max(f32::MIN_POSITIVE);
         let distant = lights::distant_emitters(stage.environment, self.settings.environment_directions);
-        // An error is judged against the light it is an error of: a sun's power beside a candle's says nothing.
-        let threshold = |power: Vec3| self_threshold * power.max_element();
-        let per_threshold = self.settings.bent_light / (self_threshold * self.placement.area.max(f32::MIN_POSITIVE));
-        let bent = |threshold: f32| per_threshold * threshold;
         let across = PI * 0.25 * diagonal * diagonal;
         let count = u64::from(bounces) + 3;
 
@@ -75,12 +77,11 @@ impl FaceClusters {
             });
             let shooters = Shooters::Lights(&stage.world.lights, stage.world.light_count);
             let (name, most) = ("punctual".to_owned(), most.sum());
-            let threshold = threshold(punctual_power(stage, across));
-            self.shoot(
-                context,
-                stage,
-                &LightPass { name, shooters, kept: Kept::No, threshold, bent_light: bent(threshold), most },
-            )?;
+            let power = punctual_power(stage, across);
+            let pass = LightPass { name, shooters, kept: Kept::No, power, most };
+            // Shown per pixel: its errors are seen only once reflected.
+            let tolerance = self.tolerance(power.max_element());
+            self.shoot(context, stage, &pass, tolerance)?;
         }
         stage.watch.step("light", 1, count)?;
         if !distant.is_empty() {
@@ -88,34 +89,24 @@ impl FaceClusters {
             let table = context.upload("face-cluster/distant emitters", &distant)?;
             let shooters = Shooters::Lights(&table, distant.len() as u32);
             let name = "environment".to_owned();
-            let threshold = threshold(distant.iter().map(|light| across * light.intensity).sum());
-            self.shoot(
-                context,
-                stage,
-                &LightPass { name, shooters, kept: Kept::Direct, threshold, bent_light: bent(threshold), most },
-            )?;
+            let power = distant.iter().map(|light| across * light.intensity).sum();
+            let pass = LightPass { name, shooters, kept: Kept::Direct, power, most };
+            let tolerance = self.judge(context, stage, &pass)?;
+            self.shoot(context, stage, &pass, tolerance)?;
         }
         stage.watch.step("light", 2, count)?;
         let emitted = self.emit(context)?;
         if emitted > 0.0 {
             let (name, shooters) = ("direct".to_owned(), Shooters::Emission);
-            let threshold = threshold(self.placement.emitted_power);
-            self.shoot(
-                context,
-                stage,
-                &LightPass {
-                    name,
-                    shooters,
-                    kept: Kept::Direct,
-                    threshold,
-                    bent_light: bent(threshold),
-                    most: emitted,
-                },
-            )?;
+            let power = self.placement.emitted_power;
+            let pass = LightPass { name, shooters, kept: Kept::Direct, power, most: emitted };
+            let tolerance = self.judge(context, stage, &pass)?;
+            self.shoot(context, stage, &pass, tolerance)?;
         }
 
         let mut first = 0.0f32;
-        let threshold = if bounces > 0 { threshold(self.reflected_power(context)?) } else { 0.0 };
+        let power = if bounces > 0 { self.reflected_power(context)? } else { Vec3::ZERO };
+        let mut judged = None;
         for bounce in 1..=bounces {
             stage.watch.step("light", u64::from(bounce) + 2, count)?;
             // What the last pass reflected is what this one shoots.
@@ -129,18 +120,14 @@ impl FaceClusters {
             recorder.fill(&self.state.next_unshot, 0);
             recorder.submit()?;
             let (name, shooters) = (format!("bounce {bounce}"), Shooters::Unshot);
-            self.shoot(
-                context,
-                stage,
-                &LightPass {
-                    name,
-                    shooters,
-                    kept: Kept::Indirect,
-                    threshold,
-                    bent_light: bent(threshold),
-                    most: unshot,
-                },
-            )?;
+            let pass = LightPass { name, shooters, kept: Kept::Indirect, power, most: unshot };
+            // Later bounces are judged as the first: they add to the same light.
+            let tolerance = match judged {
+                Some(tolerance) => tolerance,
+                None => self.judge(context, stage, &pass)?,
+            };
+            judged = Some(tolerance);
+            self.shoot(context, stage, &pass, tolerance)?;
         }
         stage.watch.step("light", count, count)?;
         self.report.solve_seconds = clock.elapsed().as_secs_f64();

@@ -2,8 +2,8 @@
 
 use super::placement::NO_ELEMENT;
 use super::report::Iteration;
-use super::shooting::{IS_LIGHT, Kept, LightPass, Shooters};
-use super::{FaceClusterError, FaceClusters, SEEDS, Stage, Visibility};
+use super::shooting::{IS_LIGHT, Kept, LightPass, Shooters, Tolerance};
+use super::{FaceClusterError, FaceClusters, SEEDS, Settings, Stage, Visibility};
 use crate::gpu::shaders::methods::face_cluster as passes;
 use crate::gpu::shaders::types::{PairCounters, PoolCounters};
 use crate::gpu::{Context, Recorder};
@@ -12,6 +12,10 @@ use std::time::Instant;
 
 /// Whole units of the most that can arrive: five bits of room to the largest i32.
 const MOST_UNITS: f32 = (1 << 26) as f32;
+/// Times the error that transfers of a coarse look may have: it says how much of a light strikes surfaces.
+const COARSER: f32 = 100.0;
+/// Of a light, what is taken to strike surfaces, at least: what is all in the dark must not be looked into without end.
+const LEAST_STRUCK: f32 = 0.01;
 /// How far rays to lights start off their surface, as a share of the scene's diagonal.
 const RAY_OFFSET: f32 = 1e-5;
 /// Where some of its light is blocked, times a receiver's area that an emitter may have before it is split first: four times
@@ -24,6 +28,13 @@ pub(super) fn ray_offset(stage: &Stage<'_>) -> f32 {
     RAY_OFFSET * (stage.bounds[1] - stage.bounds[0]).length()
 }
 
+impl LightPass<'_> {
+    /// Whole units of 1 W/m2.
+    fn units(&self) -> f32 {
+        MOST_UNITS / self.most.max(f32::MIN_POSITIVE)
+    }
+}
+
 impl FaceClusters {
     /// Shoots, settles and pulls.
     pub(super) fn shoot(
@@ -31,29 +42,21 @@ impl FaceClusters {
         context: &Context,
         stage: &Stage<'_>,
         pass: &LightPass<'_>,
+        tolerance: Tolerance,
     ) -> Result<(), FaceClusterError> {
         let clock = Instant::now();
         let shot = match pass.shooters {
             Shooters::Lights(..) => None,
             Shooters::Emission | Shooters::Unshot => Some(self.shot(context)?),
         };
-        let mut counters = context.download(&self.state.pool)?[0];
-        (counters.transfers, counters.rays, counters.largest_unshot) = (0, 0, 0);
-        context.write(&self.state.pool, &[counters])?;
-        let mut recorder = context.recorder("face-cluster")?;
-        recorder.fill(&self.state.arriving, 0);
-        recorder.submit()?;
-
-        let units = MOST_UNITS / pass.most.max(f32::MIN_POSITIVE);
-        let mut pairs = 0;
-        for seeds in self.seeds(pass.shooters).chunks(SEEDS) {
-            pairs += self.refine(context, stage, pass, units, seeds)?;
-        }
+        let units = pass.units();
+        let pairs = self.send(context, stage, pass, tolerance)?;
         if pass.kept != Kept::No {
             self.most_light += pass.most;
         }
         let counters = context.download(&self.state.pool)?[0];
         self.settle(context, pass.kept, 1.0 / units, &counters)?;
+        self.reflect(context, &counters)?;
 
         let counters = context.download(&self.state.pool)?[0];
         let received = self.received(context, counters.element_count as usize)?;
@@ -73,6 +76,53 @@ impl FaceClusters {
         Ok(())
     }
 
+    /// For light of so many W.
+    pub(super) fn tolerance(&self, power: f32) -> Tolerance {
+        let Settings { threshold, bent_light, .. } = self.settings;
+        Tolerance {
+            threshold: threshold * power,
+            bent_light: bent_light * power / self.placement.area.max(f32::MIN_POSITIVE),
+        }
+    }
+
+    /// What errors of a pass are judged by: the light of it that strikes any surface, as a coarse look says.
+    pub(super) fn judge(
+        &mut self,
+        context: &Context,
+        stage: &Stage<'_>,
+        pass: &LightPass<'_>,
+    ) -> Result<Tolerance, FaceClusterError> {
+        let sent = pass.power.max_element();
+        self.send(context, stage, pass, self.tolerance(COARSER * sent))?;
+        let counters = context.download(&self.state.pool)?[0];
+        self.settle(context, Kept::No, 1.0 / pass.units(), &counters)?;
+        let struck = self.received(context, counters.element_count as usize)?;
+        let struck = struck.into_iter().fold(0.0f64, f64::max) as f32;
+        tracing::debug!("{}: {struck} of {sent} W strike surfaces", pass.name);
+        Ok(self.tolerance(struck.clamp(LEAST_STRUCK * sent, sent)))
+    }
+
+    /// Sends a pass's light to all receivers, on which it arrives in whole units; returns the number of pairs looked at.
+    fn send(
+        &mut self,
+        context: &Context,
+        stage: &Stage<'_>,
+        pass: &LightPass<'_>,
+        tolerance: Tolerance,
+    ) -> Result<u64, FaceClusterError> {
+        let mut counters = context.download(&self.state.pool)?[0];
+        (counters.transfers, counters.rays, counters.largest_unshot) = (0, 0, 0);
+        context.write(&self.state.pool, &[counters])?;
+        let mut recorder = context.recorder("face-cluster")?;
+        recorder.fill(&self.state.arriving, 0);
+        recorder.submit()?;
+        let mut pairs = 0;
+        for seeds in self.seeds(pass.shooters).chunks(SEEDS) {
+            pairs += self.refine(context, stage, pass, tolerance, seeds)?;
+        }
+        Ok(pairs)
+    }
+
     /// Every root with every shooter.                                                    [Gobbetti2003 Alg. 1]
     fn seeds(&self, shooters: Shooters<'_>) -> Vec<UVec2> {
         let roots = self.placement.instance_count;
@@ -89,7 +139,7 @@ impl FaceClusters {
         context: &Context,
         stage: &Stage<'_>,
         pass: &LightPass<'_>,
-        units: f32,
+        tolerance: Tolerance,
         seeds: &[UVec2],
     ) -> Result<u64, FaceClusterError> {
         self.queue.start(context, seeds)?;
@@ -101,7 +151,7 @@ impl FaceClusters {
                 stage.watch.step(&pass.name, seen, seen + u64::from(counters.top))?;
                 Ok(context.download(&self.state.pool)?[0].is_full != 0)
             };
-            let step = |recorder: &mut Recorder<'_>| self.step(recorder, stage, pass, units);
+            let step = |recorder: &mut Recorder<'_>| self.step(recorder, stage, pass, tolerance);
             let counters = self.queue.go_on_while(context, "face-cluster", step, |counters| {
                 outcome = look(counters);
                 matches!(outcome, Ok(false))
@@ -115,9 +165,9 @@ impl FaceClusters {
     }
 
     /// Decides the pairs of a step, makes what is to be split, and puts the halves back.
-    fn step(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, units: f32) {
+    fn step(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, tolerance: Tolerance) {
         let (s, queue) = (&self.state, &self.queue);
-        self.decide(recorder, stage, pass, units);
+        self.decide(recorder, stage, pass, tolerance);
         self.grow(recorder, stage, matches!(pass.shooters, Shooters::Emission));
         let expand = passes::Expand {
             taken_pairs: &queue.taken,
@@ -131,7 +181,7 @@ impl FaceClusters {
     }
 
     /// Transports the pairs of a step, or decides how to split them.                       [Gobbetti2003 3.3]
-    fn decide(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, units: f32) {
+    fn decide(&self, recorder: &mut Recorder<'_>, stage: &Stage<'_>, pass: &LightPass<'_>, tolerance: Tolerance) {
         let (s, p, queue, world) = (&self.state, &self.placement, &self.queue, stage.world);
         let receiver_nodes = self.settings.receiver_rule.nodes().len() as u32;
         let shooter_nodes = self.settings.shooter_rule.nodes().len() as u32;
@@ -169,7 +219,7 @@ impl FaceClusters {
                 }
             };
         }
-        let (threshold, bent_light, alpha_test) = (pass.threshold, pass.bent_light, world.has_holes);
+        let (Tolerance { threshold, bent_light }, units, alpha_test) = (tolerance, pass.units(), world.has_holes);
         if let Shooters::Lights(lights, _) = pass.shooters {
             let diagonal = (stage.bounds[1] - stage.bounds[0]).length().max(f32::MIN_POSITIVE);
             let (far, ray_offset) = (2.0 * diagonal, RAY_OFFSET * diagonal);
@@ -287,7 +337,7 @@ impl FaceClusters {
         Ok(power.sum::<DVec3>().to_array())
     }
 
-    /// Pushes down to the leaves, reflects, and pulls up.                                   [Gobbetti2003 3.3.4]
+    /// Pushes down to the leaves.                                  [Gobbetti2003 3.3.4]
     fn settle(
         &self,
         context: &Context,
@@ -297,7 +347,6 @@ impl FaceClusters {
     ) -> Result<(), FaceClusterError> {
         let s = &self.state;
         let irradiance_functions = self.settings.irradiance_basis.functions();
-        let radiosity_functions = self.settings.radiosity_basis.functions();
         let element_count = counters.element_count;
         let mut recorder = context.recorder("face-cluster")?;
         for level in 0..=counters.deepest_level {
@@ -315,6 +364,17 @@ impl FaceClusters {
             };
             recorder.dispatch(&pass, element_count * irradiance_functions);
         }
+        recorder.submit()?;
+        Ok(())
+    }
+
+    /// Leaves reflect what arrived, as the next pass's unshot light, pulled up.            [Gobbetti2003 3.3.4, Eq. 9]
+    fn reflect(&self, context: &Context, counters: &PoolCounters) -> Result<(), FaceClusterError> {
+        let s = &self.state;
+        let irradiance_functions = self.settings.irradiance_basis.functions();
+        let radiosity_functions = self.settings.radiosity_basis.functions();
+        let element_count = counters.element_count;
+        let mut recorder = context.recorder("face-cluster")?;
         let reflect = passes::Reflect {
             elements: &s.elements,
             arriving: &s.arriving,
