@@ -3,9 +3,9 @@
 //! `LINKLIGHT_SOAK_FRAMES=10000 LINKLIGHT_SOAK_SCENES=dancer,tea-room LINKLIGHT_SOAK_SEED=7 cargo test --release --lib soak
 //! -- --nocapture` is the long form; methods by LINKLIGHT_SOAK_METHODS. What makes frames short: LINKLIGHT_SOAK_CELL=0.25
 //! for coarse copies of the scenes, with a vertex for each so many metres, and LINKLIGHT_SOAK_ELEMENTS=300 for methods with
-//! elements. LINKLIGHT_SOAK_PASSES=20 lists the passes that took longest. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks
-//! at every access of every shader (its instrumented shaders take a minute a method to compile): none reaches beyond what
-//! is bound.
+//! elements. LINKLIGHT_SOAK_PASSES=20 lists the passes that took longest; LINKLIGHT_SOAK_UNVALIDATED=1 leaves the layer
+//! away, whose own memory grows. With `LINKLIGHT_SOAK_ASSISTED=1` validation looks at every access of every shader (its
+//! instrumented shaders take a minute a method to compile): none reaches beyond what is bound.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -169,7 +169,8 @@ fn random_edits_leave_pictures_and_memory_as_they_were() {
 fn soak(scene: &str, method: &Method, frames: u64, seed: u64) {
     let (choices, method) = (settings_of(method), method.key);
     let gpu_assisted = variable("LINKLIGHT_SOAK_ASSISTED").is_some();
-    let context = Context::new(Options { validation: true, gpu_assisted, ..Options::default() }).unwrap();
+    let validation = variable("LINKLIGHT_SOAK_UNVALIDATED").is_none();
+    let context = Context::new(Options { validation, gpu_assisted, ..Options::default() }).unwrap();
     let settings = SMALL.iter().find(|(key, _)| *key == method).map_or("", |(_, settings)| settings);
     // The tea room has 1,746 charts.
     let atlas = if scene.contains("tea-room") { "atlas_resolution=64" } else { "atlas_resolution=40" };
@@ -232,9 +233,11 @@ fn soak(scene: &str, method: &Method, frames: u64, seed: u64) {
     let (early, late) = (early.iter().max().unwrap(), late.iter().max().unwrap());
     let allowed = if is_long { early + early / 100 } else { *early };
     assert!(*late <= allowed, "{scene} {method}: memory grows: {levels:?}");
-    // What the allocator keeps varies a little; other tests of the process make it vary more.
+    // What the allocator keeps varies a little; other tests of the process make it vary more. The layer keeps the names of
+    // what is gone: 3 kB a frame.
+    let allowed = if validation { 48 } else { 8 };
     let (early, late) = host.split_at(host.len() / 2);
-    let grows = is_long && late.iter().max() > early.iter().max().map(|most| most + 32).as_ref();
+    let grows = is_long && late.iter().max() > early.iter().max().map(|most| most + allowed).as_ref();
     assert!(!grows, "{scene} {method}: the process grows: {host:?} MiB");
     // The layer says first what it switches on for itself.
     let is_setting = |m: &String| m.contains("layer settings provided") || m.contains("is adjusting settings");
