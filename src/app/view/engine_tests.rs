@@ -6,6 +6,8 @@ use super::*;
 use crate::app::cli::{Cli, Command};
 use crate::app::values::{Format, Output};
 use crate::gpu::Options;
+use crate::methods::METHODS;
+use crate::methods::settings::Kind;
 use crate::stages::work::Unwatched;
 
 /// Where a test says nothing else.
@@ -107,6 +109,22 @@ fn fewer_bounces_leave_nothing_of_more() {
         let fewer = pixels(&context, &mut engine, &with(0));
         assert!(fewer == pixels(&context, &mut Engine::new(&context), &with(0)), "{method}: not a new engine's");
         assert!(fewer != more, "{method}: bounces are seen");
+        // Nor do views of what a method holds.
+        let specs = METHODS.iter().find(|m| m.key == method).unwrap().specs();
+        let pick = if specs.iter().any(|spec| spec.name == "pick") { "--set pick=3" } else { "" };
+        let views = specs.into_iter().filter(|spec| ["show", "view"].contains(&spec.name));
+        for (name, values) in views.filter_map(|spec| match spec.kind {
+            Kind::Choice { values } => Some((spec.name, values)),
+            _ => None,
+        }) {
+            for value in values {
+                let with = |bounces: u32| format!("{} --set {name}={} {pick}", with(bounces), value.name);
+                let mut engine = Engine::new(&context);
+                pixels(&context, &mut engine, &with(2));
+                let fewer = pixels(&context, &mut engine, &with(0));
+                assert!(fewer == pixels(&context, &mut Engine::new(&context), &with(0)), "{method}: {}", value.name);
+            }
+        }
     }
     assert_eq!(context.validation_messages(), [""; 0]);
 }

@@ -3,10 +3,14 @@
 
 use std::collections::HashMap;
 
+use glam::Vec3;
 use serde_json::{Value, json};
 
+use crate::scene::builtin::{self, Source};
+use crate::scene::{Scene, load_bytes};
+
 /// A .glb of the program's own making (no strides, nothing sparse) with one vertex for each cube of `cell` metres of its
-/// mesh, and for each of six directions of normals; triangles between fewer than three of them are dropped.
+/// mesh, and for each of six directions of normals; triangles without area are dropped.
 pub fn coarse(glb: &[u8], cell: f32) -> Vec<u8> {
     let word = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
     let binary_at = 20 + word(12);
@@ -49,7 +53,7 @@ impl File {
         for accessor in targets.into_iter().flatten().flat_map(|t| t.as_object_mut().unwrap().values_mut()) {
             *accessor = self.pick(accessor, &kept);
         }
-        let count = triangles.len();
+        let count = 3 * triangles.len();
         let accessor = json!({ "componentType": 5125, "count": count, "type": "SCALAR" });
         primitive["indices"] = self.accessor(accessor, bytemuck::cast_slice(&triangles));
     }
@@ -126,10 +130,28 @@ fn collapse(positions: &[[f32; 3]], normals: &[[f32; 3]], corners: &[usize], cel
             kept.len() as u32 - 1
         })
     };
-    let triangles = corners
-        .chunks_exact(3)
-        .map(|t| [stands_for(t[0]), stands_for(t[1]), stands_for(t[2])])
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
+    let triangles: Vec<[u32; 3]> =
+        corners.chunks_exact(3).map(|t| [stands_for(t[0]), stands_for(t[1]), stands_for(t[2])]).collect();
+    let at = |corner: u32| Vec3::from(positions[kept[corner as usize]]);
+    let has_area = |[a, b, c]: &[u32; 3]| (at(*b) - at(*a)).cross(at(*c) - at(*a)).length() > 1e-9;
+    let triangles = triangles.into_iter().filter(has_area).collect();
     (kept, triangles)
+}
+
+#[test]
+fn coarse_copies_keep_what_moves_and_shines() {
+    for name in ["dancer", "tea-room"] {
+        let Ok(Source::File(glb)) = builtin::resolve(name) else { panic!("{name} is a file") };
+        let [whole, small] = [glb.to_vec(), coarse(glb, 0.25)].map(|glb| load_bytes(name, &glb).unwrap());
+        let counts = |s: &Scene| {
+            let primitives: Vec<usize> = s.meshes.iter().map(|mesh| mesh.primitives.len()).collect();
+            ([s.nodes.len(), s.materials.len(), s.skins.len(), s.clips.len(), s.lights.len()], primitives)
+        };
+        assert_eq!(small.notes, [""; 0], "{name}");
+        assert_eq!(counts(&small), counts(&whole), "{name}");
+        let vertices =
+            |s: &Scene| s.meshes.iter().flat_map(|m| &m.primitives).map(|p| p.positions.len()).sum::<usize>();
+        println!("{name}: {} of {} vertices", vertices(&small), vertices(&whole));
+        assert!(vertices(&small) * 4 < vertices(&whole), "{name}");
+    }
 }

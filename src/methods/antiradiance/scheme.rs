@@ -120,6 +120,12 @@ impl Antiradiance {
         self.sources(&mut recorder, false);
         self.has_bounced = bounces > 0;
         if !self.has_bounced {
+            recorder.submit()?;
+            // No step is taken: what views show of the tables is the sources' light, not what an earlier solution left.
+            if self.settings.view.shows_tables() {
+                self.start(context)?;
+            }
+            let mut recorder = context.recorder("antiradiance")?;
             recorder.fill(&self.tables.irradiance, 0);
             return Ok(recorder.submit()?);
         }

@@ -28,6 +28,13 @@ crate::choice! {
     }
 }
 
+impl DebugView {
+    /// Whether it shows what elements send, or how that changed.
+    pub(super) fn shows_tables(self) -> bool {
+        matches!(self, Self::Light | Self::Antiradiance | Self::Difference | Self::Residual)
+    }
+}
+
 impl Settings {
     /// The picked direction of propagation, unit.
     pub fn view_direction(&self) -> Vec3 {
