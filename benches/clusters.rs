@@ -110,7 +110,7 @@ impl Row {
         let view = View::of_scene(&scene, &pose, None, Some(bounds), SIZE).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
-        let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
+        let shadow_maps = ShadowMaps::new(context, &pose, SIZE.to_array()).unwrap();
         let (solve, shown) = ([f64::INFINITY; 2], Shown { raster: f64::INFINITY, all: f64::INFINITY });
         Ok(Self {
             scene,

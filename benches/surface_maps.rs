@@ -291,7 +291,7 @@ fn gathers(context: &Context, method: &SurfaceShadowMaps, stage: &Stage<'_>, bvh
         texels / two / 1e3,
         two / one
     );
-    let shadow_maps = ShadowMaps::new(context, pose).unwrap();
+    let shadow_maps = ShadowMaps::new(context, pose, SIZE.to_array()).unwrap();
     let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
     let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
     let view = View::of_scene(stage.scene, pose, None, Some(stage.bounds), SIZE).unwrap();

@@ -47,7 +47,7 @@ fn show(context: &Context, scene: &Scene, view: &View, samples: u32, direct: f32
     let world = World::new(context, scene, &geometry, &pose, &Environment::Constant(Vec3::splat(0.25)), false).unwrap();
     let vertices = world_vertices(&geometry, &pose);
     let bvh = Bvh::build(context, &vertices.positions, &geometry.triangles).unwrap();
-    let shadow_maps = ShadowMaps::new(context, &pose).unwrap();
+    let shadow_maps = ShadowMaps::new(context, &pose, [SIZE, SIZE]).unwrap();
     let g_buffer = GBuffer::new(context, SIZE, SIZE).unwrap();
     let film = Film::new(context, SIZE, SIZE).unwrap();
     let irradiance =

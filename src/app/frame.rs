@@ -155,7 +155,7 @@ impl Method {
         stage: &Stage,
         method: Box<dyn OnElements>,
     ) -> Result<Self, AppError> {
-        let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+        let shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         let gather = Gather::of_display(context, request, stage, &*method)?;
         let splat_sums = splat_sums(context, request)?;
@@ -250,15 +250,15 @@ impl Method {
     /// Takes over what `request` changed of the picture alone: its size, its display and what that was told. The
     /// solution stays.
     pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {
-        let g_buffer = || GBuffer::new(context, request.width, request.height);
         match self {
             Self::PathTracing(method) => **method = path_tracing(context, request, stage)?,
             Self::OnElements(shown) => {
-                shown.g_buffer = g_buffer()?;
+                shown.g_buffer = GBuffer::new(context, request.width, request.height)?;
+                shown.shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
                 shown.gather = Gather::of_display(context, request, stage, &*shown.method)?;
                 shown.splat_sums = splat_sums(context, request)?;
             }
-            Self::OnTexels(shown) => shown.show(context, request)?,
+            Self::OnTexels(shown) => shown.show(context, request, stage)?,
             Self::OnClusters(shown) => shown.show(context, request, stage)?,
         }
         Ok(())

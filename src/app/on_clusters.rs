@@ -140,7 +140,7 @@ impl ClustersShown {
         let cache = cache_folder().map(|folder| folder.join("clusters"));
         let stage_of = cluster_stage(stage, cache.as_deref(), watch);
         let method = FaceClusters::prepare(context, &stage_of, request.settings()?).map_err(AppError::failed)?;
-        let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+        let shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         let gather = Gather::of_display(context, request, stage)?;
         Ok(Self { method, shadow_maps, g_buffer, gather })
@@ -166,6 +166,7 @@ impl ClustersShown {
     /// As [`super::frame::Method::show`].
     pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {
         self.g_buffer = GBuffer::new(context, request.width, request.height)?;
+        self.shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
         self.gather = Gather::of_display(context, request, stage)?;
         Ok(())
     }

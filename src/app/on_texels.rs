@@ -98,7 +98,7 @@ impl TexelsShown {
         let method = SurfaceShadowMaps::prepare(context, &of_scene, request.settings()?).map_err(AppError::failed)?;
         tracing::info!("{}", method.report());
         let shown = Shown::new(context, request, &method)?;
-        let shadow_maps = ShadowMaps::new(context, &stage.pose)?;
+        let shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
         let g_buffer = GBuffer::new(context, request.width, request.height)?;
         Ok(Self { method, shadow_maps, g_buffer, shown })
     }
@@ -171,9 +171,10 @@ impl TexelsShown {
     }
 
     /// As [`super::frame::Method::show`].
-    pub fn show(&mut self, context: &Context, request: &RenderRequest) -> Result<(), AppError> {
+    pub fn show(&mut self, context: &Context, request: &RenderRequest, stage: &Stage) -> Result<(), AppError> {
         self.shown = Shown::new(context, request, &self.method)?;
         self.g_buffer = GBuffer::new(context, request.width, request.height)?;
+        self.shadow_maps = ShadowMaps::new(context, &stage.pose, [request.width, request.height])?;
         Ok(())
     }
 

@@ -14,9 +14,12 @@ use glam::{Mat4, Vec3, Vec4};
 
 /// Depth memory that all layers together may take; the resolution is halved until they fit.
 const MEMORY_BYTES: u64 = 256 << 20;
-/// Texels a side where memory allows.
+/// Texels a side where memory allows, for pictures that show them.
 const FULL_EXTENT: u32 = 2048;
 const LEAST_EXTENT: u32 = 128;
+/// Texels a side for each pixel of the picture's longer side: finer ones would not be told apart, and where texels leave
+/// doubt rays decide.
+const TEXELS_PER_PIXEL: u32 = 4;
 /// Faces of a point light see this much beyond 90 degrees, so that filtering never leaves a face.
 const FACE_MARGIN: f32 = 1.02;
 
@@ -32,10 +35,11 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    /// Room for the lights of `pose`; more views than the device has image layers are refused.
-    pub fn new(context: &Context, pose: &Pose) -> Result<Self, GpuError> {
+    /// Room for the lights of `pose`, as fine as a picture of `width` x `height` pixels asks for; more views than the device
+    /// has image layers are refused.
+    pub fn new(context: &Context, pose: &Pose, [width, height]: [u32; 2]) -> Result<Self, GpuError> {
         let view_count: u32 = pose.lights.iter().map(|l| view_count_of(l.kind)).sum();
-        let mut extent = FULL_EXTENT.min(context.limits().image_extent);
+        let mut extent = extent_for(width.max(height)).min(context.limits().image_extent);
         while extent > LEAST_EXTENT && u64::from(view_count) * u64::from(extent).pow(2) * 4 > MEMORY_BYTES {
             extent /= 2;
         }
@@ -86,6 +90,11 @@ impl ShadowMaps {
             }
         });
     }
+}
+
+/// Texels a side for a picture with so many pixels on its longer side.
+fn extent_for(pixels: u32) -> u32 {
+    TEXELS_PER_PIXEL.saturating_mul(pixels).clamp(LEAST_EXTENT, FULL_EXTENT).next_power_of_two()
 }
 
 fn view_count_of(kind: LightKind) -> u32 {
@@ -187,6 +196,12 @@ mod tests {
     fn project(view: &ShadowView, point: Vec3) -> Vec3 {
         let clip = Mat4::from_cols_array_2d(&view.clip_from_world) * point.extend(1.0);
         clip.truncate() / clip.w
+    }
+
+    #[test]
+    fn small_pictures_have_small_maps() {
+        let extents = [1, 30, 33, 160, 400, 512, 4000, u32::MAX].map(extent_for);
+        assert_eq!(extents, [128, 128, 256, 1024, 2048, 2048, 2048, 2048]);
     }
 
     #[test]

@@ -31,7 +31,7 @@ fn splats_reproduce_even_and_linear_light() {
     assert!(splats.iter().all(|splat| splat.share_count == 1));
     let sums = SplatSums::new(&context, SIZE, SIZE).unwrap();
     let (g_buffer, shadow_maps) =
-        (GBuffer::new(&context, SIZE, SIZE).unwrap(), ShadowMaps::new(&context, &pose).unwrap());
+        (GBuffer::new(&context, SIZE, SIZE).unwrap(), ShadowMaps::new(&context, &pose, [SIZE, SIZE]).unwrap());
     let film = Film::new(&context, SIZE, SIZE).unwrap();
     let shown = |light: &dyn Fn(Vec3) -> f32| {
         let mut irradiance = vec![Vec3::ZERO; method.elements().count as usize];

@@ -85,7 +85,7 @@ impl Fixture {
         samples: u32,
         pull: impl FnOnce(&mut Recorder<'_>),
     ) -> Gather {
-        let shadow_maps = ShadowMaps::new(context, &self.pose).unwrap();
+        let shadow_maps = ShadowMaps::new(context, &self.pose, SIZE.to_array()).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
         let display = FinalGather::new(context, SIZE.to_array(), settings, ToneSettings::default(), self.seed).unwrap();

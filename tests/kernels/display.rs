@@ -236,7 +236,7 @@ impl Case {
     fn draw_by(&self, context: &Context, samples: u32, by_query: bool) -> (Pictures, Pictures) {
         let Self { scene, geometry, pose, environment, view, .. } = self;
         let world = World::new(context, scene, geometry, pose, environment, false).unwrap();
-        let shadow_maps = ShadowMaps::new(context, pose).unwrap();
+        let shadow_maps = ShadowMaps::new(context, pose, SIZE.to_array()).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
         let vertices = world_vertices(geometry, pose);

@@ -119,7 +119,7 @@ impl Lit {
     fn draw(&self, context: &Context, per_vertex: bool) -> ([Vec<Vec3>; 2], Surfaces) {
         let Case { scene, geometry, pose, environment, view, .. } = &self.case;
         let world = World::new(context, scene, geometry, pose, environment, false).unwrap();
-        let shadow_maps = ShadowMaps::new(context, pose).unwrap();
+        let shadow_maps = ShadowMaps::new(context, pose, SIZE.to_array()).unwrap();
         let g_buffer = GBuffer::new(context, SIZE.x, SIZE.y).unwrap();
         let film = Film::new(context, SIZE.x, SIZE.y).unwrap();
         let halves = |vectors: &[Mat3]| context.upload("test/vectors", &vectors.iter().map(packed).collect::<Vec<_>>());

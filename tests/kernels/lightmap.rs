@@ -86,7 +86,7 @@ fn lightmap_agrees_with_its_twin() {
     let (direct, indirect) = (values(), values());
     let Case { scene, geometry, pose, environment, view, .. } = &case;
     let world = World::new(&context, scene, geometry, pose, environment, false).unwrap();
-    let shadow_maps = ShadowMaps::new(&context, pose).unwrap();
+    let shadow_maps = ShadowMaps::new(&context, pose, SIZE.to_array()).unwrap();
     let g_buffer = GBuffer::new(&context, SIZE.x, SIZE.y).unwrap();
     let film = Film::new(&context, SIZE.x, SIZE.y).unwrap();
     let light = TexelLight {

@@ -129,7 +129,7 @@ impl Fixture {
         settings: final_gather::Settings,
         size: UVec2,
     ) -> Shown {
-        let shadow_maps = ShadowMaps::new(context, &self.pose).unwrap();
+        let shadow_maps = ShadowMaps::new(context, &self.pose, size.to_array()).unwrap();
         let g_buffer = GBuffer::new(context, size.x, size.y).unwrap();
         let film = Film::new(context, size.x, size.y).unwrap();
         let view = View::of_scene(&self.scene, &self.pose, None, Some(self.bounds), size).unwrap();

@@ -29,7 +29,7 @@ fn texels_of_metal_send_their_lobes_share_of_even_light() {
     fixture.solve(&context, &method, 1);
     let view = View::of_scene(&fixture.scene, &fixture.pose, None, Some(fixture.bounds), UVec2::splat(32)).unwrap();
     let (shadow_maps, g_buffer) =
-        (ShadowMaps::new(&context, &fixture.pose).unwrap(), GBuffer::new(&context, 1, 1).unwrap());
+        (ShadowMaps::new(&context, &fixture.pose, [1, 1]).unwrap(), GBuffer::new(&context, 1, 1).unwrap());
     let by = final_gather::Settings { gather_threshold: 0.01, ..Default::default() };
     let glossy = GlossyTexels::new(&context, &method.atlas, by, ToneSettings::default(), 3).unwrap();
     let from = Gathered {
