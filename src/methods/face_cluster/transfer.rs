@@ -98,7 +98,7 @@ impl FaceClusters {
         self.settle(context, Kept::No, 1.0 / pass.units(), &counters)?;
         let struck = self.received(context, counters.element_count as usize)?;
         let struck = struck.into_iter().fold(0.0f64, f64::max) as f32;
-        tracing::debug!("{}: {struck} of {sent} W strike surfaces", pass.name);
+        tracing::debug!("{struck} of {sent} W of the light {} strike surfaces", pass.name);
         Ok(self.tolerance(struck.clamp(LEAST_STRUCK * sent, sent)))
     }
 
