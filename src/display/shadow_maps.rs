@@ -19,7 +19,7 @@ const FULL_EXTENT: u32 = 2048;
 const LEAST_EXTENT: u32 = 128;
 /// Texels a side for each pixel of the picture's longer side: finer ones would not be told apart, and where texels leave
 /// doubt rays decide.
-const TEXELS_PER_PIXEL: u32 = 4;
+const TEXELS_PER_PIXEL: u32 = 8;
 /// Faces of a point light see this much beyond 90 degrees, so that filtering never leaves a face.
 const FACE_MARGIN: f32 = 1.02;
 
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn small_pictures_have_small_maps() {
-        let extents = [1, 30, 33, 160, 400, 512, 4000, u32::MAX].map(extent_for);
+        let extents = [1, 16, 17, 80, 200, 256, 4000, u32::MAX].map(extent_for);
         assert_eq!(extents, [128, 128, 256, 1024, 2048, 2048, 2048, 2048]);
     }
 
