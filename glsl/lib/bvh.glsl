@@ -93,10 +93,9 @@ const uint BVH_LEVELS = 48;
 // per thread, a texel fetch is not); a node or a leaf by turns 0.75 in such buffers; bounds in f32 0.35 to 0.45, eight
 // children less; leaves of one triangle 1.7; new rays for threads that are done, every 8 to 24 turns, 1.85.
 // Where `both` is true, the result is the nearest hit at least `gap` behind `first`, the nearest of all; `lit`: on a lit side.
-Hit walk(Ray ray, bool any, bool both, bool lit, float gap, inout Hit first)
+Hit walk(Ray ray, bool any, bool both, bool lit, float gap, inout Hit first, inout PassedOver passed_over)
 {
     Hit hit = Hit(ray.t_max, NO_HIT, vec2(0));
-    first = hit;
     if (!is_active(ray)) return hit;
     RayFrame frame = ray_frame(ray);
 
@@ -182,7 +181,7 @@ Hit walk(Ray ray, bool any, bool both, bool lit, float gap, inout Hit first)
         Hit before = hit;
         bool found = intersect_triangle(frame, slot, test, ray.t_min, hit);
         if (found && any) break;
-        if (both && found) keep_both(before, gap, lit, first, hit);
+        if (both && found) keep_both(before, gap, lit, first, hit, passed_over);
         if (leaf == 0 && node == NO_NODE && group == 0 && depth == 0) break;
     }
     return hit;
@@ -191,9 +190,7 @@ Hit walk(Ray ray, bool any, bool both, bool lit, float gap, inout Hit first)
 Hit traverse(Ray ray, bool any)
 {
     Hit first;
-    return walk(ray, any, false, false, 0.0, first);
+    PassedOver passed_over;
+    return walk(ray, any, false, false, 0.0, first, passed_over);
 }
-
-// The nearest hit, and the nearest of those at least `gap` (and a rounding error) behind it, on lit sides alone or on all.
-void traverse_both(Ray ray, bool lit, float gap, out Hit first, out Hit second) { second = walk(ray, false, true, lit, gap, first); }
 #endif

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_EXT_nonuniform_qualifier : require
 #include "lib/prelude.glsl"
-#include "lib/bvh.glsl"
+#include "surface_maps/both_surfaces.glsl"
 #include "surface_maps/depth_interval.glsl"
 #include "surface_maps/pixel_ray.glsl"
 #include "trace/holes.glsl"
