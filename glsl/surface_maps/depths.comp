@@ -6,8 +6,9 @@
 #include "surface_maps/pixel_ray.glsl"
 #include "trace/holes.glsl"
 
-// One thread per pixel of the cube maps of a chunk: both surfaces along its ray by one walk of our own traversal, and the
-// depths between them. What cube_rays, two closest hits, second_rays and intervals do, without their lists.
+// One thread per pixel of the cube maps of a chunk: both surfaces along its ray by one walk of our own traversal (two where
+// surfaces lie within a gap of each other), and the depths between them. What cube_rays, two closest hits, second_rays and
+// intervals do, without their lists.
 // Differs from [Ritschel2008]: where it is asked for, the second surface is the next one that is lit from this side, not the
 // back of a thin body: only such can be asked for, and depths hold longer.
 //                                                                                                [Ritschel2008 3.2]

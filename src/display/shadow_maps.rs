@@ -17,8 +17,8 @@ const MEMORY_BYTES: u64 = 256 << 20;
 /// Texels a side where memory allows, for pictures that show them.
 const FULL_EXTENT: u32 = 2048;
 const LEAST_EXTENT: u32 = 128;
-/// Texels a side for each pixel of the picture's longer side: finer ones would not be told apart, and where texels leave
-/// doubt rays decide.
+/// Texels a side for each pixel of the picture's longer side: where texels leave doubt rays decide, so that finer ones tell
+/// more only in the shadow of what is thinner than a texel.
 const TEXELS_PER_PIXEL: u32 = 8;
 /// Faces of a point light see this much beyond 90 degrees, so that filtering never leaves a face.
 const FACE_MARGIN: f32 = 1.02;

@@ -2,6 +2,7 @@
 //! that long work can go through many of them.
 
 use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 use glam::Vec3;
 use serde_json::{Value, json};
@@ -11,7 +12,7 @@ use crate::scene::{Scene, load_bytes};
 
 /// A .glb of the program's own making (no strides, nothing sparse) with one vertex for each cube of `cell` metres of its
 /// mesh, and for each of six directions of normals; triangles without area are dropped.
-pub fn coarse(glb: &[u8], cell: f32) -> Vec<u8> {
+fn coarse(glb: &[u8], cell: f32) -> Vec<u8> {
     let word = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().unwrap()) as usize;
     let binary_at = 20 + word(12);
     let mut file = File {
@@ -24,6 +25,14 @@ pub fn coarse(glb: &[u8], cell: f32) -> Vec<u8> {
     }
     file.json["meshes"] = meshes;
     file.glb()
+}
+
+/// Where a coarse copy of a built-in scene was written, in `folder`.
+pub fn coarse_file(folder: &Path, name: &str, cell: f32) -> PathBuf {
+    let Ok(Source::File(glb)) = builtin::resolve(name) else { panic!("{name} is not kept as a file") };
+    let file = folder.join(format!("{name}.glb"));
+    std::fs::write(&file, coarse(glb, cell)).unwrap();
+    file
 }
 
 struct File {
@@ -45,9 +54,8 @@ impl File {
             .map(|halvings| collapse(&positions, &normals, &corners, cell / f32::powi(2.0, halvings)))
             .find(|(_, triangles)| !triangles.is_empty())
             .unwrap();
-        let mut chosen: Vec<&mut Value> = primitive["attributes"].as_object_mut().unwrap().values_mut().collect();
-        for accessor in &mut chosen {
-            **accessor = self.pick(accessor, &kept);
+        for accessor in primitive["attributes"].as_object_mut().unwrap().values_mut() {
+            *accessor = self.pick(accessor, &kept);
         }
         let targets = primitive.get_mut("targets").and_then(Value::as_array_mut);
         for accessor in targets.into_iter().flatten().flat_map(|t| t.as_object_mut().unwrap().values_mut()) {

@@ -10,13 +10,12 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use super::soak_scenes::coarse;
+use super::soak_scenes::coarse_file;
 use super::tests::try_pixels;
 use super::*;
 use crate::gpu::Options;
 use crate::methods::settings::Kind;
 use crate::methods::{METHODS, Method};
-use crate::scene::builtin::{self, Source};
 
 /// Small enough for every method, and enough for what its settings cost.
 const SMALL: [(&str, &str); 4] = [
@@ -155,10 +154,7 @@ fn random_edits_leave_pictures_and_memory_as_they_were() {
     for name in scenes.split(',') {
         let mut scene = format!("builtin:{name}");
         if let Some(cell) = variable("LINKLIGHT_SOAK_CELL") {
-            let Ok(Source::File(glb)) = builtin::resolve(name) else { panic!("{name} is not kept as a file") };
-            let file = folder.path().join(format!("{name}.glb"));
-            std::fs::write(&file, coarse(glb, cell.parse().unwrap())).unwrap();
-            scene = file.display().to_string();
+            scene = coarse_file(folder.path(), name, cell.parse().unwrap()).display().to_string();
         }
         for method in METHODS.iter().filter(|method| chosen(method.key)) {
             soak(&scene, method, frames, seed);
@@ -249,9 +245,7 @@ fn soak(scene: &str, method: &Method, frames: u64, seed: u64) {
 #[test]
 fn maps_of_a_later_pose_are_those_of_a_new_engine() {
     let folder = tempfile::tempdir().unwrap();
-    let Ok(Source::File(glb)) = builtin::resolve("dancer") else { panic!("the dancer is a file") };
-    let file = folder.path().join("dancer.glb");
-    std::fs::write(&file, coarse(glb, 0.6)).unwrap();
+    let file = coarse_file(folder.path(), "dancer", 0.6);
     let context = Context::new(Options { validation: true, ..Options::default() }).unwrap();
     let (_, settings) = SMALL[0];
     let asked = |seconds: f32| {
