@@ -79,14 +79,21 @@ float most_projected_area(FaceElement e, vec3 direction)
          + max(d.z, 0.0) * e.facing[4] + max(-d.z, 0.0) * e.facing[5];
 }
 
-// Area projected towards a unit direction as it is expected between its bounds, m2: the faces' vector area, and what of
-// them turns away from it and is not hidden by the rest: to all sides alike where the element is closed, and the more to
-// the sides the flatter it is. Over all directions a share of 1 - self_share.
+// Area projected towards a unit direction as it is expected between its bounds, m2: of faces whose normals lie evenly
+// around the mean one, as a ball's (a quarter of all to every side), a half ball's, or a cap's: all that turns to the
+// direction above some height, nothing below as much. It is larger than towards the other side by what the vector area
+// is, and over all directions pi times the area that does not face itself.
 float projected_area(FaceElement e, vec3 direction)
 {
-    float flat_share = vector_area(e) / max(e.area, 1e-30), along = dot(e.axis_z, direction);
-    float aside = max((1.0 - e.self_share) * e.area - vector_area(e), 0.0);
-    float expected = vector_area(e) * max(along, 0.0) + 0.25 * aside * (1.0 + flat_share - 2.0 * flat_share * abs(along));
+    float flat_area = vector_area(e), along = dot(e.axis_z, direction);
+    float open = max((1.0 - e.self_share) * e.area, flat_area), share = flat_area / max(open, 1e-30);
+    float expected;
+    if (share > 0.75) {
+        float height = sqrt(max(3.0 / share - 3.0, 0.0));
+        expected = flat_area * (along >= height ? along : along <= -height ? 0.0 : (along + height) * (along + height) / (4.0 * height));
+    } else {
+        expected = open * (0.25 + 0.5 * share * along + 0.75 * max(share - 0.5, 0.0) * (along * along - 1.0 / 3.0));
+    }
     return min(expected, most_projected_area(e, direction));
 }
 

@@ -17,6 +17,8 @@ use std::f32::consts::PI;
 /// W that the faces of a material receive: by the solver, and by rays.
 #[derive(Clone, Copy, Default)]
 struct Received {
+    /// Of sides that are lit, m2.
+    area: f64,
     solved: f64,
     by_rays: f64,
 }
@@ -41,6 +43,7 @@ fn row(
         });
         part.unwrap().material as usize
     };
+    let corners = |t: usize| fixture.geometry.triangles[t].map(|v| fixture.positions[v as usize]);
     let material_of: Vec<usize> = (0..fixture.geometry.triangles.len()).map(material_of).collect();
     let mut table = vec![Received::default(); fixture.scene.materials.len()];
     let mut material_of_leaf = vec![usize::MAX; all.len()];
@@ -48,6 +51,8 @@ fn row(
         for leaf in [s.x, s.y] {
             if leaf != u32::MAX {
                 material_of_leaf[leaf as usize] = material_of[t];
+                let [a, b, c] = corners(t);
+                table[material_of[t]].area += 0.5 * f64::from((b - a).cross(c - a).length());
             }
         }
     }
@@ -57,7 +62,6 @@ fn row(
     }
     // Rays off the emitters' fronts.
     let faces: Vec<usize> = (0..material_of.len()).filter(|&t| emitters.contains(&material_of[t])).collect();
-    let corners = |t: usize| fixture.geometry.triangles[t].map(|v| fixture.positions[v as usize]);
     let mut cumulative = vec![0.0f64];
     for &t in &faces {
         let [a, b, c] = corners(t);
@@ -138,12 +142,16 @@ fn parts_receive_what_rays_off_the_faces_say() {
     for (emitters, tolerance) in [(vec![0, 1, 2], 0.01), (vec![1], 0.02), (vec![2], 0.02)] {
         let (sent, table) = row(&context, &room, &emitters, Settings::default(), 100_000);
         let total = table.iter().fold(Received::default(), |sum, r| Received {
+            area: sum.area + r.area,
             solved: sum.solved + r.solved,
             by_rays: sum.by_rays + r.by_rays,
         });
         println!("{emitters:?} send {sent:.3} W; rays say {:.3}, the solver {:.3}", total.by_rays, total.solved);
         for (part, r) in ["walls", "ball", "post"].iter().zip(&table) {
             println!("    {part}: {:.3} by rays, {:.3} solved, ratio {:.3}", r.by_rays, r.solved, r.solved / r.by_rays);
+            // Where everything shines alike, every place receives pi times its radiance.
+            let off = r.solved / (f64::from(PI) * r.area) - 1.0;
+            assert!(emitters.len() < 3 || off.abs() < 0.01, "{part} is off by {off} where everything shines");
         }
         assert!((total.by_rays / sent - 1.0).abs() < 0.02, "the room is closed: {} of {sent}", total.by_rays);
         assert!((total.solved / total.by_rays - 1.0).abs() < tolerance, "{} of {}", total.solved, total.by_rays);
@@ -262,7 +270,7 @@ fn light_comes_through_small_openings() {
     // Each threshold meets other openings.
     for threshold in [1e-3, 3e-4, 1e-4, 3e-5, 1e-5] {
         let (_, table) = row(&context, &scene, &[2], Settings { threshold, ..Settings::default() }, 1_000_000);
-        let Received { solved, by_rays } = table[0];
+        let Received { solved, by_rays, .. } = table[0];
         println!("threshold {threshold:e}: the floor gets {solved:.4} W, by rays {by_rays:.4}");
         mean += solved / by_rays / 5.0;
     }

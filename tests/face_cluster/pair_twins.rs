@@ -30,11 +30,22 @@ fn most_area(e: &FaceElement, d: DVec3) -> f64 {
 }
 
 fn projected_area(e: &FaceElement, d: DVec3) -> f64 {
-    let (area, flat, along) = (f64::from(e.area), vector_area(e), e.axis_z.as_dvec3().dot(d));
-    let aside = ((1.0 - f64::from(e.self_share)) * area - flat).max(0.0);
-    let share = flat / area;
-    let to_sides = share * 2.0 * (1.0 - along.abs()) + (1.0 - share);
-    (flat * along.max(0.0) + aside / 4.0 * to_sides).min(most_area(e, d))
+    let (flat, c) = (vector_area(e), e.axis_z.as_dvec3().dot(d));
+    let open = ((1.0 - f64::from(e.self_share)) * f64::from(e.area)).max(flat);
+    let share = flat / open.max(1e-30);
+    let expected = if share > 0.75 {
+        let s = (3.0 / share - 3.0).sqrt();
+        flat * if c >= s {
+            c
+        } else if c <= -s {
+            0.0
+        } else {
+            (c + s).powi(2) / (4.0 * s)
+        }
+    } else {
+        open * (0.25 + 0.5 * share * c + 0.75 * (share - 0.5).max(0.0) * (c * c - 1.0 / 3.0))
+    };
+    expected.min(most_area(e, d))
 }
 
 /// What is kept of light 1 from `d`.
@@ -321,9 +332,13 @@ pub fn transport(
             let side = if inst.is_back != 0 { -1.0 } else { 1.0 };
             let is_seen = |[p, q, s]: &[DVec3; 3]| side * (q - p).cross(s - p).dot(x - p) > 0.0;
             let seen = faces.map(|f| t.corners(f)).filter(is_seen);
-            let exact: DVec3 = seen.map(|corners| triangle_vector(x, a.axis_z.as_dvec3(), corners)).sum();
-            sum = exact.length();
-            let kept = if sum > 0.0 { sum * kept_vector(t, a, exact / sum) } else { DVec3::ZERO };
+            let seen: Vec<_> = seen.collect();
+            let normal = a.axis_z.as_dvec3();
+            let on = |side: f64| seen.iter().map(|&corners| triangle_vector(x, side * normal, corners)).sum::<DVec3>();
+            let parts = if is_flat(a) { vec![on(1.0)] } else { vec![on(1.0), on(-1.0)] };
+            sum = parts.iter().map(|part| part.length()).sum();
+            let kept = |part: &DVec3| part.length() * kept_vector(t, a, part.normalize_or_zero());
+            let kept: DVec3 = parts.iter().map(kept).sum();
             vectors = [0, 1, 2].map(|c| kept * mean[c]);
         }
         at_nodes.push(vectors.map(|v| v / sum.max(1.0)));

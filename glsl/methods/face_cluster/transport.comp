@@ -47,6 +47,9 @@ vec3 exact_vector(FaceElement b, vec3 x, vec3 normal)
     return sum;
 }
 
+// What is kept of a vector that is part of all.
+vec3 kept_part(FaceElement a, vec3 v) { return dot(v, v) > 0.0 ? length(v) * kept_vector(a, normalize(v)) : vec3(0.0); }
+
 float most(vec3 v) { return max(v.x, max(v.y, v.z)); }
 
 void main()
@@ -123,9 +126,11 @@ void main()
         }
         // Neighbours stand nearer than nodes can tell, and those of faces that do not fill a square stand unevenly.
         if (sends && (is_face || is_exact && off < EXACT_REACH * EXACT_REACH * dot(b.half_extent, b.half_extent))) {
-            vec3 mean = sum > 0.0 ? sent / sum : radiosity[0], exact = exact_vector(b, x, a.axis_z);
-            sum = length(exact);
-            at_nodes[r] = sum > 0.0 ? outerProduct(sum * kept_vector(a, exact / sum), mean) : mat3(0.0);
+            vec3 mean = sum > 0.0 ? sent / sum : radiosity[0], above = exact_vector(b, x, a.axis_z);
+            // Faces that look aside see what lies below the mean one's horizon.
+            vec3 below = is_flat(a) ? vec3(0.0) : exact_vector(b, x, -a.axis_z);
+            sum = length(above) + length(below);
+            at_nodes[r] = outerProduct(kept_part(a, above) + kept_part(a, below), mean);
         }
         // No surface receives more than a hemisphere of the shooter's light.
         if (sum > 1.0) at_nodes[r] /= sum;
