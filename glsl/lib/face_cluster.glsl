@@ -10,16 +10,21 @@ struct FaceCluster {
     uint albedo[3];         // least and mean, and the most of albedo and specular reflectance; shared exponent
     vec3 emission;          // mean, W m^-2 sr^-1
     uint emission_range[2]; // least and most; shared exponent
-    uint first_face;        // in the order of the tree
-    uint face_count;        // its lower bits; the others: what of the faces turned off the normal meets the cluster itself
+    uint first_face;        // lower bits: in the order of the tree; upper: of what is turned off the normal, by backs
+    uint face_count;        // lower bits; upper: of what is turned off the normal, what meets the cluster itself, by fronts
 };
-const uint FACE_COUNT_BITS = 28u;
+const uint INDEX_BITS = 28u;
 
-uint face_count(FaceCluster c) { return bitfieldExtract(c.face_count, 0, int(FACE_COUNT_BITS)); }
+uint face_count(FaceCluster c) { return bitfieldExtract(c.face_count, 0, int(INDEX_BITS)); }
+uint first_face(FaceCluster c) { return bitfieldExtract(c.first_face, 0, int(INDEX_BITS)); }
 
-// Of what the faces send beyond the vector area, the share that strikes the cluster itself: 0 of a convex one, 1 of a
-// hollow or a rough one.
-float hollowness(FaceCluster c) { return float(c.face_count >> FACE_COUNT_BITS) / 15.0; }
+// Of what one side of the faces sends beyond the vector area, the share that meets the cluster itself if nothing stands
+// between: 0 where no face sees another.                                                       [Gobbetti2003 3.3.3]
+float self_share(FaceCluster c, bool back)
+{
+    uint level = (back ? c.first_face : c.face_count) >> INDEX_BITS;
+    return level == 0 ? 0.0 : exp2(0.5 * (float(level) - 15.0));
+}
 
 vec3 rotated(vec4 q, vec3 v)
 {

@@ -7,7 +7,8 @@ use glam::Vec3;
 use linklight::gpu::shaders::methods::face_cluster as passes;
 use linklight::gpu::shaders::types::FaceCluster;
 use linklight::stages::clusters::{
-    ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, hollowness, least_projected_area, most_projected_area,
+    ClusterTree, MAX_DEPTH, MeshFaces, axes, cache, face_count, first_face, least_projected_area, most_projected_area,
+    normal_projected_area, self_shares,
 };
 use linklight::stages::world::World;
 
@@ -134,7 +135,7 @@ fn fault(mesh: &Mesh, tree: &ClusterTree) -> Option<String> {
         return Some(format!("{} levels", tree.depth));
     }
     for (i, cluster) in tree.clusters.iter().enumerate() {
-        let (first, faces) = (cluster.first_face as usize, face_count(cluster) as usize);
+        let (first, faces) = (first_face(cluster) as usize, face_count(cluster) as usize);
         let own = &tree.faces[first..first + faces];
         let area: f32 = own.iter().map(|&f| mesh.normal_area(f).length()).sum();
         if (cluster.area - area).abs() > 1e-4 * area.max(1e-6) {
@@ -150,8 +151,8 @@ fn fault(mesh: &Mesh, tree: &ClusterTree) -> Option<String> {
         }
         if let Some([left, right]) = tree.children(i as u32) {
             let [a, b] = [left, right].map(|c| &tree.clusters[c as usize]);
-            let split = a.first_face == cluster.first_face
-                && b.first_face == a.first_face + face_count(a)
+            let split = first_face(a) == first_face(cluster)
+                && first_face(b) == first_face(a) + face_count(a)
                 && face_count(a) + face_count(b) == face_count(cluster);
             if !split {
                 return Some(format!("cluster {i} is not its children {left} and {right}"));
@@ -194,7 +195,7 @@ fn projected_areas_lie_within_their_bounds() {
         for (i, cluster) in tree.clusters.iter().enumerate().step_by(1 + tree.clusters.len() / 60) {
             for _ in 0..16 {
                 let d = Vec3::new(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.5).normalize();
-                let first = cluster.first_face as usize;
+                let first = first_face(cluster) as usize;
                 let own = &tree.faces[first..first + face_count(cluster) as usize];
                 let projected: f32 = own.iter().map(|&f| mesh.normal_area(f).dot(d).max(0.0)).sum();
                 let (least, most) = (least_projected_area(cluster, d), most_projected_area(cluster, d));
@@ -213,11 +214,51 @@ fn projected_areas_lie_within_their_bounds() {
 
 #[test]
 fn convex_is_what_cannot_see_itself() {
-    let root = |mesh: &Mesh| hollowness(&mesh.tree().clusters[0]) == 0.0;
+    let root = |mesh: &Mesh| self_shares(&mesh.tree().clusters[0])[0] == 0.0;
     assert!(root(&sheet(8, |_, _| 0.0)) && root(&sphere(8)));
     assert!(root(&sheet(8, |x, y| -(x - 0.5).powi(2) - (y - 0.5).powi(2))), "a dome seen from outside");
     assert!(!root(&sheet(8, |x, y| (x - 0.5).powi(2) + (y - 0.5).powi(2))), "a bowl seen from inside");
     assert!(!root(&soup(4)));
+}
+
+/// What a cluster sends itself: all that does not leave a bowl's opening, nothing of its outside; and of waves, what rays
+/// between all faces say.
+#[test]
+fn clusters_send_themselves_what_closed_forms_and_all_pairs_say() {
+    let share = |mesh: &Mesh| {
+        let root = mesh.tree().clusters[0];
+        let turned = 1.0 - normal_projected_area(&root) / root.area;
+        self_shares(&root).map(|share| share * turned)
+    };
+    let bowl = sheet(24, |x, y| 1.2 * ((x - 0.5).powi(2) + (y - 0.5).powi(2)));
+    let rim = |mesh: &Mesh| {
+        let area: f32 = (0..mesh.triangles.len() as u32).map(|f| mesh.normal_area(f).length()).sum();
+        let opening: Vec3 = (0..mesh.triangles.len() as u32).map(|f| mesh.normal_area(f)).sum();
+        1.0 - opening.length() / area
+    };
+    let [inside, outside] = share(&bowl);
+    println!("a bowl: {inside} inside, {outside} outside, expected {} and nothing", rim(&bowl));
+    assert!((inside / rim(&bowl) - 1.0).abs() < 0.2 && outside == 0.0, "{inside}, {outside}");
+
+    let waves = sheet(24, |x, y| 0.08 * (9.0 * x).sin() * (11.0 * y).cos());
+    let centers = |f: u32| waves.triangles[f as usize].iter().map(|&v| waves.positions[v as usize]).sum::<Vec3>() / 3.0;
+    let (mut meets, mut area) = ([0.0f64; 2], 0.0f64);
+    for f in 0..waves.triangles.len() as u32 {
+        area += f64::from(waves.normal_area(f).length());
+        for g in (0..waves.triangles.len() as u32).filter(|&g| g != f) {
+            let d = centers(g) - centers(f);
+            let (out, back) = (waves.normal_area(f).dot(d), -waves.normal_area(g).dot(d));
+            if out * back > 0.0 {
+                let value = f64::from(out * back / d.length_squared().powi(2)) / std::f64::consts::PI;
+                meets[usize::from(out < 0.0)] += value;
+            }
+        }
+    }
+    let found = share(&waves);
+    let expected = meets.map(|m| m / area);
+    println!("waves: {found:?}, all pairs say {expected:?}");
+    // Steps of half a power of two, and few pairs.
+    assert!((0..2).all(|k| (0.7..1.4).contains(&(f64::from(found[k]) / expected[k]))), "{found:?}, {expected:?}");
 }
 
 /// A flat sheet of two colours is cut along their border first.

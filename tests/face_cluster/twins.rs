@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
 use linklight::gpu::shaders::types::{ClusterInstance, CubatureNode, FaceCluster, FaceElement};
-use linklight::stages::clusters::{face_count, hollowness, measure::decode_color};
+use linklight::stages::clusters::{face_count, first_face, measure::decode_color, self_shares};
 use std::ops::Range;
 
 pub const NONE: u32 = u32::MAX;
@@ -82,10 +82,10 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         parent,
         children: NONE,
         level,
-        first_place: inst.first_triangle + c.first_face,
+        first_place: inst.first_triangle + first_face(c),
         place_count: count(c),
-        // Known when nodes are laid; until then whether there is any.
-        self_share: if is_back || hollowness(c) > 0.0 { 1.0 } else { 0.0 },
+        self_share: self_shares(c)[usize::from(is_back)]
+            * (1.0 - (c.facing[4] - c.facing[5]) / c.area.max(1e-30)).clamp(0.0, 1.0),
         center: (linear * c.center.as_dvec3() + at).as_vec3(),
         axis_x: axis(0),
         axis_y: axis(1),
@@ -178,7 +178,7 @@ fn laid(t: &Tables, e: &FaceElement, uv: DVec2) -> Vec<(DVec3, DVec3)> {
         places.push(if count(c) > 1 {
             (linear * in_box(cluster) + at, side * e.axis_z.as_dvec3())
         } else {
-            let corners = t.corners(t.triangle_at(inst, c.first_face));
+            let corners = t.corners(t.triangle_at(inst, first_face(c)));
             (nearest(point, corners).lerp(corners.iter().sum::<DVec3>() / 3.0, 0.05), front(corners))
         });
     }
@@ -351,21 +351,10 @@ pub fn weights(t: &Tables, e: &FaceElement, nodes: &[Vec3]) -> Vec<f64> {
     mean_weights(t, e, nodes, t.receiver_nodes..nodes.len())
 }
 
-/// Elements without what is hidden of them, and what they send themselves.
+/// Elements without what is hidden of them.
 pub fn exposed(mut e: FaceElement, laid: &Nodes) -> FaceElement {
     e.area = (f64::from(e.area) * laid.share) as f32;
     e.facing = e.facing.map(|sum| (f64::from(sum) * laid.share) as f32);
-    let count = laid.places.len();
-    let between = |k: usize, l: usize| -> f64 {
-        let d = (laid.places[l] - laid.places[k]).as_dvec3();
-        let cosines = d.dot(laid.normals[k].as_dvec3()).max(0.0) * (-d).dot(laid.normals[l].as_dvec3()).max(0.0);
-        let squared = d.length_squared().max(1e-20);
-        (f64::from(e.area) * cosines / (std::f64::consts::PI * squared * squared)).min(count as f64)
-    };
-    let pairs = (0..count).flat_map(|k| (0..count).filter(move |&l| l != k).map(move |l| (k, l)));
-    let form_factor = pairs.map(|(k, l)| between(k, l)).sum::<f64>() / (count * (count - 1)) as f64;
-    let bound = (1.0 - vector_area(&e) / f64::from(e.area).max(1e-30)).clamp(0.0, 1.0);
-    e.self_share *= form_factor.clamp(0.02 * bound, bound) as f32;
     e
 }
 

@@ -4,6 +4,7 @@ use crate::pair_twins::Way;
 use crate::twins::{Tables, count, frame, turn};
 use glam::{DVec3, Vec3};
 use linklight::gpu::shaders::types::{ClusterInstance, FaceElement};
+use linklight::stages::clusters::first_face;
 
 /// What says whether light passes.
 #[derive(Clone, Copy, PartialEq)]
@@ -48,7 +49,7 @@ fn past_cluster(
     y: DVec3,
 ) -> f64 {
     let c = &t.clusters[index as usize];
-    let (first, last) = (inst.first_triangle + c.first_face, inst.first_triangle + c.first_face + count(c));
+    let (first, last) = (inst.first_triangle + first_face(c), inst.first_triangle + first_face(c) + count(c));
     let is_passed = passed.iter().any(|&[f, n]| first >= f && last <= f + n);
     let holds = passed.iter().any(|&[f, n]| first < f + n && f < last);
     let (linear, at) = frame(inst);
@@ -68,7 +69,7 @@ fn past_cluster(
         Some(children) if holds || shadow > width => {
             children.into_iter().map(|child| past_cluster(t, inst, child, passed, width, x, y)).product()
         }
-        None if count(c) == 1 => f64::from(u8::from(!meets(x, y, t.corners(t.triangle_at(inst, c.first_face))))),
+        None if count(c) == 1 => f64::from(u8::from(!meets(x, y, t.corners(t.triangle_at(inst, first_face(c)))))),
         _ if holds => 1.0,
         _ => {
             let d = d.normalize();

@@ -46,7 +46,7 @@ float free_share(vec3 x, vec3 y, float width)
         uint node = inst.first_cluster, end = cluster_skips[node];
         while (node < end && share > 1e-3) {
             FaceCluster c = clusters[node];
-            uint first = inst.first_triangle + c.first_face, count = face_count(c);
+            uint first = inst.first_triangle + first_face(c), count = face_count(c);
             uint skip = cluster_skips[node];
             vec4 to_box = vec4(-c.rotation.xyz, c.rotation.w);
             vec3 o = rotated(to_box, origin - c.center), d = rotated(to_box, way);
@@ -67,7 +67,7 @@ float free_share(vec3 x, vec3 y, float width)
                 continue;
             }
             if (is_leaf && count == 1) {
-                uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + c.first_face]];
+                uvec3 v = triangles[inst.first_triangle + tree_faces[inst.first_face + first_face(c)]];
                 if (meets(x, y, positions[v.x], positions[v.y], positions[v.z])) share = 0.0;
             } else if (!holds) {
                 share *= 1.0 - opacity(c, d / length(d));

@@ -62,7 +62,7 @@ vec3 laid_on_faces(ClusterInstance inst, uint cluster, vec3 point, inout vec3 no
     FaceCluster c = clusters[cluster];
     if (face_count(c) > 1) return inst.world_from_tree * vec4(clamped_to_box(c, q), 1.0);
     vec3 corners[3];
-    corners_of(inst, c.first_face, corners);
+    corners_of(inst, first_face(c), corners);
     normal = normal_of(corners, normal);
     // Off the border, which other faces share: rays along it would meet them.
     return mix(nearest_of_triangle(point, corners[0], corners[1], corners[2]), (corners[0] + corners[1] + corners[2]) / 3.0, 0.05);
@@ -116,19 +116,5 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
         node_normals[index * RULE_NODES + k] = packSnorm4x8(vec4(laid_normals[k], 0.0));
     }
     return max(exposed / float(RULE_NODES), LEAST_EXPOSED);
-}
-
-// Of what the element that was laid last sends, what meets itself if nothing stands between: the mean over its nodes.
-float self_form_factor(float area)
-{
-    float sum = 0.0;
-    [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k)
-        [[dont_unroll]] for (uint l = 0; l < k; ++l) {
-            vec3 d = laid_places[l] - laid_places[k];
-            float squared = max(dot(d, d), 1e-20);
-            float facing = max(dot(d, laid_normals[k]), 0.0) * max(-dot(d, laid_normals[l]), 0.0);
-            sum += min(facing * area / (PI * squared * squared), float(RULE_NODES));
-        }
-    return 2.0 * sum / float(RULE_NODES * (RULE_NODES - 1));
 }
 #endif

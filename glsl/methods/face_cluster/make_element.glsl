@@ -29,9 +29,6 @@ const uint RULE_NODES = RECEIVER_NODES + SHOOTER_NODES;
 #include "methods/face_cluster/lay_nodes.glsl"
 #include "methods/face_cluster/fit_functions.glsl"
 
-// Of the bound on what a cluster that is not convex sends itself, what is expected at least: its nodes may miss it all.
-const float LEAST_SELF_SHARE = 0.02;
-
 void make_element(uint index, uint instance, uint cluster, uint parent, uint level, float ray_offset)
 {
     ClusterInstance inst = instances[instance];
@@ -44,7 +41,7 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
     e.parent = parent;
     e.children = NO_FACE_ELEMENT;
     e.level = level;
-    e.first_place = inst.first_triangle + c.first_face;
+    e.first_place = inst.first_triangle + first_face(c);
     e.place_count = face_count(c);
     e.center = inst.world_from_tree * vec4(c.center, 1.0);
     e.axis_x = axes * rotated(c.rotation, vec3(1, 0, 0));
@@ -64,10 +61,8 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
     float share = lay_nodes(index, e, inst, ray_offset);
     e.area *= share;
     for (uint k = 0; k < 6; ++k) e.facing[k] *= share;
-    // Nothing of what is convex; what bulges is hollow from behind.                           [Gobbetti2003 3.3.3]
-    // Differs from [Gobbetti2003]: there the bound is taken, which most of what lies apart does not come near.
-    float bound = clamp(1.0 - vector_area(e) / max(e.area, 1e-30), 0.0, 1.0);
-    e.self_share = back || hollowness(c) > 0.0 ? clamp(self_form_factor(e.area), LEAST_SELF_SHARE * bound, bound) : 0.0;
+    // Differs from [Gobbetti2003]: there the bound is taken (3.3.3), which most of what lies apart does not come near.
+    e.self_share = self_share(c, back) * clamp(1.0 - vector_area(e) / max(e.area, 1e-30), 0.0, 1.0);
     elements[index] = e;
     fit_functions(index, e, inst, share == 1.0);
     atomicMax(pool[0].deepest_level, level);

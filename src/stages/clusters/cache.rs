@@ -4,7 +4,7 @@
 //! or cannot be read is as good as not there: the tree is built again. Files not used for longest make room for new ones
 //! ([`kept`]).
 
-use super::{ClusterTree, MAX_DEPTH, MeshFaces, face_count};
+use super::{ClusterTree, MAX_DEPTH, MeshFaces, face_count, first_face};
 use crate::files;
 use crate::gpu::shaders::types::FaceCluster;
 use crate::stages::kept;
@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// To be raised whenever trees of the same mesh come out different.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const MAGIC: [u8; 8] = *b"LLclustr";
 /// Meshes of fewer faces are clustered faster than read.
 pub const LEAST_FACES: usize = 4096;
@@ -116,7 +116,9 @@ fn is_sound(tree: &ClusterTree) -> bool {
     let mut next = 0;
     while let Some((cluster, level, first, count)) = expected.pop() {
         let here = &tree.clusters[cluster as usize];
-        if cluster != next || (here.first_face, face_count(here)) != (first, count) || level > tree.depth.min(MAX_DEPTH)
+        if cluster != next
+            || (first_face(here), face_count(here)) != (first, count)
+            || level > tree.depth.min(MAX_DEPTH)
         {
             return false;
         }

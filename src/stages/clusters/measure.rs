@@ -5,7 +5,8 @@
 //! bounds are bounds.                                                                    [Gobbetti2003 3.1]
 
 use super::forest::Forest;
-use super::{FACE_COUNT_BITS, MeshFaces};
+use super::self_transfer::{self, SelfTransfer};
+use super::{INDEX_BITS, MeshFaces};
 use crate::gpu::shaders::types::FaceCluster;
 use crate::scene::calipers;
 use glam::{DVec3, Mat3, Quat, Vec2, Vec3};
@@ -19,11 +20,11 @@ const TASK_FACES: u32 = 2048;
 const GROWTH: f32 = 1.0 + 1e-5;
 
 /// A face with what it contributes.
-struct Face {
-    corners: [Vec3; 3],
+pub(super) struct Face {
+    pub corners: [Vec3; 3],
     /// A n.
-    normal: Vec3,
-    area: f32,
+    pub normal: Vec3,
+    pub area: f32,
     albedo: Vec3,
     reflectance: Vec3,
     emission: Vec3,
@@ -51,35 +52,48 @@ pub fn measure(mesh: &MeshFaces<'_>, forest: &Forest) -> Vec<FaceCluster> {
 }
 
 /// Measures the cluster at `first` and all below it, into `out`; returns points whose hull is that of its faces, nearly,
-/// and its normal.
+/// its normal, and what it sends itself.
 fn measure_subtree(
     forest: &Forest,
     faces: &[Face],
     first: usize,
     first_face: u32,
     out: &mut [FaceCluster],
-) -> (Vec<Vec3>, Vec3) {
+) -> (Vec<Vec3>, Vec3, SelfTransfer) {
     let count = forest.counts[first];
     let own = &faces[first_face as usize..(first_face + count) as usize];
-    let (outline, fallback) = if count == 1 {
-        (own[0].corners.to_vec(), Vec3::Y)
+    let (outline, fallback, kept) = if count == 1 {
+        (own[0].corners.to_vec(), Vec3::Y, [0.0; 2])
     } else {
         let left_count = forest.counts[first + 1];
         let right = 2 * left_count as usize;
         let (left_out, right_out) = out[1..].split_at_mut(right - 1);
         let mut left = || measure_subtree(forest, faces, first + 1, first_face, left_out);
         let mut right = || measure_subtree(forest, faces, first + right, first_face + left_count, right_out);
-        let ((mut outline, normal), (others, _)) =
+        let ((mut outline, normal, of_left), (others, _, of_right)) =
             if count > TASK_FACES { rayon::join(left, right) } else { (left(), right()) };
         outline.extend(others);
-        (thin(outline), normal)
+        let (left, right) = own.split_at(left_count as usize);
+        let between = self_transfer::between(left, right);
+        (thin(outline), normal, [0, 1].map(|k| of_left[k] + of_right[k] + 2.0 * between[k]))
     };
     out[0] = cluster(own, &outline, fallback, first_face);
-    if !forest.convex[first] {
-        out[0].face_count |= ((15.0 * hollowness(own)).round() as u32).max(1) << FACE_COUNT_BITS;
-    }
+    let turned = out[0].area - super::normal_projected_area(&out[0]);
+    let [front, back] = kept.map(|power| self_level(power, turned));
+    let least = u32::from(!forest.convex[first]);
+    out[0].face_count |= (front.max(least) * least) << INDEX_BITS;
+    out[0].first_face |= back << INDEX_BITS;
     let normal = super::axes(&out[0]).z_axis;
-    (outline, normal)
+    (outline, normal, kept)
+}
+
+/// `power` of `turned` (both m2), which it may not exceed, in steps of half a power of two; 0 is none.
+fn self_level(power: f32, turned: f32) -> u32 {
+    if power <= 0.0 || turned <= 0.0 {
+        0
+    } else {
+        (15.0 + 2.0 * (power / turned).log2()).round().clamp(0.0, 15.0) as u32
+    }
 }
 
 /// At most 26 of many points: the extreme ones.
@@ -145,26 +159,6 @@ fn cluster(faces: &[Face], outline: &[Vec3], fallback: Vec3, first_face: u32) ->
         first_face,
         face_count: faces.len() as u32,
     }
-}
-
-/// Whether faces lean outwards from their middle, or as much inwards: from 0 (all outwards) to 1.
-fn hollowness(faces: &[Face]) -> f32 {
-    let (mut area, mut normal, mut center) = (0.0f32, Vec3::ZERO, Vec3::ZERO);
-    let middle = |face: &Face| (face.corners[0] + face.corners[1] + face.corners[2]) / 3.0;
-    for face in faces {
-        area += face.area;
-        normal += face.normal;
-        center += face.area * middle(face);
-    }
-    let scale = 1.0 / area.max(f32::MIN_POSITIVE);
-    let (normal, center) = (normal * scale, center * scale);
-    let (mut outwards, mut all) = (0.0f32, 0.0f32);
-    for face in faces {
-        let lean = (face.normal - face.area * normal).dot(middle(face) - center);
-        outwards += lean;
-        all += lean.abs();
-    }
-    if all > 0.0 { (1.0 - outwards / all).clamp(0.0, 1.0) } else { 1.0 }
 }
 
 /// x, y by callipers around z. The quaternion's own axes, so that what is stored is what was measured.

@@ -7,6 +7,7 @@
 //! | [`forest`] | orders them: preorder, every cluster's faces one range, depth bounded |
 //! | [`cache`] | keeps trees between runs |
 //! | [`measure`] | what each is like: oriented box, areas, spread of attributes |
+//! | [`self_transfer`] | what of a cluster's light meets itself |
 //!
 //! A tree belongs to a mesh; instances share it. The left child of cluster `i` is `i + 1`, the right one follows the
 //! left one's `2 n - 1` clusters, and a cluster of one face is a leaf: no indices are stored.
@@ -18,12 +19,13 @@ pub mod cache;
 pub mod contract;
 pub mod forest;
 pub mod measure;
+pub mod self_transfer;
 
 use crate::gpu::shaders::types::FaceCluster;
 use glam::{Mat3, Quat, Vec3, Vec4};
 
-/// Lower bits of [`FaceCluster::face_count`] that count faces; the upper four hold [`hollowness`].
-pub const FACE_COUNT_BITS: u32 = 28;
+/// Lower bits of [`FaceCluster::face_count`] and [`FaceCluster::first_face`]; the upper four hold [`self_shares`].
+pub const INDEX_BITS: u32 = 28;
 
 /// Levels of a tree, at most.
 pub const MAX_DEPTH: u32 = 96;
@@ -83,13 +85,21 @@ impl ClusterTree {
 
 /// Faces of the cluster.
 pub fn face_count(cluster: &FaceCluster) -> u32 {
-    cluster.face_count & ((1 << FACE_COUNT_BITS) - 1)
+    cluster.face_count & ((1 << INDEX_BITS) - 1)
 }
 
-/// Of what the faces send beyond their vector area, the share that strikes the cluster itself: 0 where no face sees
-/// another's front, 1 where the cluster is hollow, or as much so as not.
-pub fn hollowness(cluster: &FaceCluster) -> f32 {
-    (cluster.face_count >> FACE_COUNT_BITS) as f32 / 15.0
+/// Place of the cluster's first face.
+pub fn first_face(cluster: &FaceCluster) -> u32 {
+    cluster.first_face & ((1 << INDEX_BITS) - 1)
+}
+
+/// Of what the faces' fronts and their backs send beyond their vector area, the shares that meet the cluster itself if
+/// nothing stands between: 0 where none sees another.                                     [Gobbetti2003 3.3.3]
+pub fn self_shares(cluster: &FaceCluster) -> [f32; 2] {
+    [cluster.face_count, cluster.first_face].map(|word| match word >> INDEX_BITS {
+        0 => 0.0,
+        level => (0.5 * (level as f32 - 15.0)).exp2(),
+    })
 }
 
 /// The box's axes; z along the area-averaged normal.
