@@ -68,9 +68,6 @@ vec3 laid_on_faces(ClusterInstance inst, uint cluster, vec3 point, inout vec3 no
     return mix(nearest_of_triangle(point, corners[0], corners[1], corners[2]), (corners[0] + corners[1] + corners[2]) / 3.0, 0.05);
 }
 
-// Of the element that was laid last.
-vec3 laid_places[RULE_NODES], laid_normals[RULE_NODES];
-
 // Lays all nodes; returns the share of the element's area that is not hidden. Nodes that are hidden are moved to where
 // some are not. A single face has a rule of its own, for triangles.
 // Differs from [Gobbetti2003]: there nodes lie in the box's plane, on its whole square.
@@ -80,6 +77,7 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
     float side = inst.is_back != 0 ? -1.0 : 1.0;
     vec3 corners[3];
     if (is_face) corners_of(inst, e.first_place - inst.first_triangle, corners);
+    vec3 laid_places[RULE_NODES], laid_normals[RULE_NODES];
     uint hidden = 0;
     uint seen = 0;
     float exposed = 0.0;
