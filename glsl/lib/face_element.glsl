@@ -33,6 +33,7 @@ struct FaceElement {
     vec3 albedo;            // mean
     float most_albedo;      // of all channels
     vec3 emission;          // mean, W m^-2 sr^-1
+    uint is_part_hidden;    // 1: some of its nodes lie inside other bodies, not all
 };
 const uint NO_FACE_ELEMENT = 0xffffffffu;
 
@@ -61,6 +62,16 @@ float vector_area(FaceElement e) { return max(e.facing[4] - e.facing[5], 0.0); }
 // Whether the faces look so many ways that light from behind the mean normal reaches much of them: two at a right angle
 // do, of which it is 0.707.
 bool is_bent(FaceElement e) { return vector_area(e) < 0.8 * e.area; }
+
+// What nodes may miss of what is free of partly hidden faces, as a share of it.
+const float MISSED_SHARE = 0.25;
+
+// Whether light must meet the faces apart: bent ones where it is bright, and partly hidden ones where what nodes may miss
+// of what is reflected is more than `threshold`, both in W.
+bool is_met_apart(FaceElement e, bool is_bright, float reflected, float threshold)
+{
+    return is_bent(e) && is_bright || e.is_part_hidden != 0 && MISSED_SHARE * reflected > threshold;
+}
 
 // Whether the faces lie in one plane, nearly.
 bool is_flat(FaceElement e) { return e.place_count == 1 || vector_area(e) > 0.99 * e.area; }

@@ -4,6 +4,7 @@
 use crate::common::scenes::{light, parallelogram, scene};
 use crate::common::{Random, TestContext};
 use crate::fixture::{Fixture, leaves, received};
+use crate::grown::closed_box;
 use crate::physics::{around, one_sided};
 use crate::twins;
 use glam::Vec3;
@@ -155,6 +156,23 @@ fn parts_receive_what_rays_off_the_faces_say() {
         }
         assert!((total.by_rays / sent - 1.0).abs() < 0.02, "the room is closed: {} of {sent}", total.by_rays);
         assert!((total.solved / total.by_rays - 1.0).abs() < tolerance, "{} of {}", total.solved, total.by_rays);
+    }
+}
+
+/// A slab lies on a plinth, sunk into it by a little: what of its lower side shows takes the floor's light, though most
+/// nodes there lie inside the plinth.
+#[test]
+fn what_shows_of_a_sunk_body_takes_its_light() {
+    let context = TestContext::new();
+    let floor = parallelogram(Vec3::new(-1.0, 0.0, -1.0), 2.0 * Vec3::Z, 2.0 * Vec3::X, 32, 0);
+    let plinth = closed_box(Vec3::new(-0.3, 0.001, -0.3), Vec3::new(0.3, 0.5, 0.3), 4, 1);
+    let slab = closed_box(Vec3::new(-0.22, 0.49, -0.26), Vec3::new(0.36, 0.6, 0.34), 24, 2);
+    let scene = scene(vec![one_sided(0.0), one_sided(0.5), one_sided(0.5)], vec![floor, plinth, slab], &[]);
+    for threshold in [3e-2, 1e-2, 3e-3, 1e-3] {
+        let (_, table) = row(&context, &scene, &[0], Settings { threshold, ..Settings::default() }, 1_000_000);
+        let Received { solved, by_rays, .. } = table[2];
+        println!("threshold {threshold:e}: the slab gets {solved:.4} W, by rays {by_rays:.4}, {:.3}", solved / by_rays);
+        assert!((solved / by_rays - 1.0).abs() < 0.1, "threshold {threshold:e}: {solved} of {by_rays} W");
     }
 }
 

@@ -112,7 +112,7 @@ fn grown_in(count: usize, [height, waves]: [f32; 2], post: Option<Primitive>) ->
 }
 
 /// Six sides of `cells` x `cells` squares, welded, wound outwards.
-fn closed_box(low: Vec3, high: Vec3, cells: u32, material: u32) -> Primitive {
+pub fn closed_box(low: Vec3, high: Vec3, cells: u32, material: u32) -> Primitive {
     let size = high - low;
     let (x, y, z) = (Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z);
     let sides = [(low, z, y), (low + x, y, z), (low, x, z), (low + y, z, x), (low, y, x), (low + z, x, y)];

@@ -164,11 +164,11 @@ impl Reaching {
         let stake = f64::from(a.most_albedo) * most / way.threshold;
         let bend = most / (way.bent_light * f64::from(a.area));
         let mut quotients = vec![stake];
-        let bends = |e: &FaceElement| is_bent(e) && t.children(e.cluster).is_some();
-        let bent = [(Some(a), SPLIT_RECEIVER), (shooter, SPLIT_SHOOTER)].into_iter();
-        if let Some((_, decision)) = bent.into_iter().find(|(e, _)| e.is_some_and(bends)) {
-            quotients.push(bend);
-            if bend > 1.0 {
+        for (e, decision) in [(Some(a), SPLIT_RECEIVER), (shooter, SPLIT_SHOOTER)] {
+            let Some(e) = e.filter(|e| t.children(e.cluster).is_some()) else { continue };
+            quotients.extend(is_bent(e).then_some(bend));
+            quotients.extend((e.is_part_hidden != 0).then_some(0.25 * stake));
+            if is_bent(e) && bend > 1.0 || e.is_part_hidden != 0 && 0.25 * stake > 1.0 {
                 return Outcome::new(decision | self.shadow, quotients);
             }
         }

@@ -96,6 +96,7 @@ pub fn element(t: &Tables, instance: u32, cluster: u32, parent: u32, level: u32)
         albedo: decode_color(c.albedo[1]),
         most_albedo: decode_color(c.albedo[2]).max_element(),
         emission: c.emission,
+        is_part_hidden: 0,
     }
 }
 
@@ -198,7 +199,7 @@ pub struct Nodes {
 /// `lay_nodes`.
 pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
     let side = if t.instances[e.instance as usize].is_back != 0 { -1.0 } else { 1.0 };
-    let (mut places, mut free, mut is_clear, mut exposed) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
+    let (mut places, mut free, mut is_clear, mut tried) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
     let mut normals: Vec<DVec3> = Vec::new();
     for rule in t.rules_of(e) {
         let (mut last, mut clear, mut normal) = ((DVec3::ZERO, false), true, DVec3::ZERO);
@@ -208,7 +209,7 @@ pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
             clear &= found.iter().all(|(place, _)| place.distance(found[0].0) < 1e-4);
             normal = side * found[0].1;
             last = (found[0].0, !is_hidden(t, found[0].0, side * found[0].1));
-            exposed += f64::from(u8::from(last.1 && k == 0));
+            tried += 1.0;
             if last.1 {
                 break;
             }
@@ -218,13 +219,14 @@ pub fn nodes(t: &Tables, e: &FaceElement) -> Nodes {
         free.push(last.1);
         is_clear.push(clear);
     }
-    if let Some(seen) = free.iter().rposition(|&free| free) {
-        let seen = (places[seen], normals[seen]);
-        for k in (0..free.len()).filter(|&k| !free[k]) {
-            (places[k], normals[k]) = seen;
+    // The one before, around.
+    let count = free.len();
+    for k in (0..count).filter(|&k| !free[k]) {
+        if let Some(seen) = (1..count).map(|back| (k + count - back) % count).find(|&other| free[other]) {
+            (places[k], normals[k]) = (places[seen], normals[seen]);
         }
     }
-    let share = (exposed / places.len() as f64).max(1.0 / 32.0);
+    let share = (free.iter().filter(|&&free| free).count() as f64 / tried).max(1.0 / 256.0);
     if share < 1.0 && !is_clear.iter().all(|&clear| clear) {
         is_clear.iter_mut().for_each(|clear| *clear = false);
     }
@@ -355,6 +357,7 @@ pub fn weights(t: &Tables, e: &FaceElement, nodes: &[Vec3]) -> Vec<f64> {
 pub fn exposed(mut e: FaceElement, laid: &Nodes) -> FaceElement {
     e.area = (f64::from(e.area) * laid.share) as f32;
     e.facing = e.facing.map(|sum| (f64::from(sum) * laid.share) as f32);
+    e.is_part_hidden = u32::from(laid.share > 1.0 / 256.0 && laid.share < 1.0);
     e
 }
 

@@ -6,8 +6,8 @@
 
 // Places that are looked at for a node.
 const uint TRIES = 8;
-// Share of an element's area that is not hidden, at least: what its nodes miss.
-const float LEAST_EXPOSED = 1.0 / 32.0;
+// Share of an element's area that is not hidden, at least: what all places that are looked at miss.
+const float LEAST_EXPOSED = 1.0 / 256.0;
 
 // The nearest point of a triangle.                                                             [Ericson2004 5.1.5]
 vec3 nearest_of_triangle(vec3 p, vec3 a, vec3 b, vec3 c)
@@ -79,8 +79,7 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
     if (is_face) corners_of(inst, e.first_place - inst.first_triangle, corners);
     vec3 laid_places[RULE_NODES], laid_normals[RULE_NODES];
     uint hidden = 0;
-    uint seen = 0;
-    float exposed = 0.0;
+    uint seen = 0, tried = 0;
     [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k) {
         CubatureNode node = rules[is_face ? RULE_NODES + k : k];
         vec3 place = vec3(0.0), normal;
@@ -97,7 +96,7 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
                 place = laid_on_faces(inst, e.cluster, plane_point(e, uv), normal);
             }
             is_free = !is_hidden(place, side * normal, ray_offset);
-            if (t == 0 && is_free) exposed += 1.0;
+            ++tried;
         }
         if (is_free) seen = k;
         hidden |= is_free ? 0u : 1u << k;
@@ -105,14 +104,15 @@ float lay_nodes(uint index, FaceElement e, ClusterInstance inst, float ray_offse
         laid_normals[k] = side * normal;
     }
     [[dont_unroll]] for (uint k = 0; k < RULE_NODES; ++k) {
-        // Where none was found for one, another's.
-        if ((hidden >> k & 1u) != 0 && bitCount(hidden) < RULE_NODES) {
+        // Where none was found for one, that of the one before it.
+        if ((hidden >> k & 1u) == 0) seen = k;
+        else if (bitCount(hidden) < RULE_NODES) {
             laid_places[k] = laid_places[seen];
             laid_normals[k] = laid_normals[seen];
         }
         element_nodes[index * RULE_NODES + k] = laid_places[k];
         node_normals[index * RULE_NODES + k] = packSnorm4x8(vec4(laid_normals[k], 0.0));
     }
-    return max(exposed / float(RULE_NODES), LEAST_EXPOSED);
+    return max(float(RULE_NODES - bitCount(hidden)) / float(tried), LEAST_EXPOSED);
 }
 #endif

@@ -59,6 +59,7 @@ void make_element(uint index, uint instance, uint cluster, uint parent, uint lev
 
     // What is hidden is no surface.
     float share = lay_nodes(index, e, inst, ray_offset);
+    e.is_part_hidden = uint(share > LEAST_EXPOSED && share < 1.0);
     e.area *= share;
     for (uint k = 0; k < 6; ++k) e.facing[k] *= share;
     // Differs from [Gobbetti2003]: there the bound is taken (3.3.3), which most of what lies apart does not come near.

@@ -136,15 +136,15 @@ void main()
         if (sum > 1.0) at_nodes[r] /= sum;
         greatest_of_all = max(greatest_of_all, greatest[r]);
     }
+    float reflected = a.most_albedo * greatest_of_all;
     // What lights a receiver from many sides cancels in one vector, and a shooter is not as bright on all its sides: where
     // that is too much light, faces must be met apart, small as they are.
-    bool splits_a = is_bent(a) && can_split(a), splits_b = is_bent(b) && can_split(b);
-    if ((splits_a || splits_b) && greatest_of_all > params.bent_light * a.area) {
+    bool is_bright = greatest_of_all > params.bent_light * a.area, splits_a = is_met_apart(a, is_bright, reflected, params.threshold) && can_split(a);
+    if (splits_a || is_met_apart(b, is_bright, reflected, params.threshold) && can_split(b)) {
         decisions[i] = (splits_a ? SPLIT_RECEIVER : SPLIT_SHOOTER) | shadow;
         return;
     }
-    // So little that even an error of all of it does not matter needs no more than one ray.
-    bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
+    bool is_small = reflected <= params.threshold;  // an error of all of it does not matter: one ray is enough
 
     passed_places = uvec4(a.first_place, a.place_count, b.first_place, b.place_count);
     float wider = is_far && shadow != 0 ? params.wider : 1.0;

@@ -74,12 +74,13 @@ void main()
         at_nodes[r] = outerProduct(kept_vector(a, direction), arrives);
     }
     // Nothing is kept from behind the mean normal: what many faces look at must find them apart, small as they are.
-    if (is_bent(a) && can_split(a) && greatest_of_all > params.bent_light * a.area) {
+    float reflected = a.most_albedo * greatest_of_all;
+    if (is_met_apart(a, greatest_of_all > params.bent_light * a.area, reflected, params.threshold) && can_split(a)) {
         decisions[i] = SPLIT_RECEIVER;
         return;
     }
     if (greatest_of_all <= 0.0) return;
-    bool is_small = a.most_albedo * greatest_of_all <= params.threshold;
+    bool is_small = reflected <= params.threshold;
     uint turn = a.cluster % RECEIVER_NODES, ray_count = 0;
     float free[RECEIVER_NODES], sum_free = 0.0;
     bool is_asked[RECEIVER_NODES];
