@@ -149,7 +149,11 @@ fn random_edits_leave_pictures_and_memory_as_they_were() {
     let seed: u64 = variable("LINKLIGHT_SOAK_SEED").map_or(1, |text| text.parse().unwrap());
     let scenes = variable("LINKLIGHT_SOAK_SCENES").unwrap_or_else(|| "cornell-box".into());
     let methods = variable("LINKLIGHT_SOAK_METHODS");
-    let chosen = |key: &str| methods.as_ref().is_none_or(|list| list.split(',').any(|name| name == key));
+    let asked: Vec<&str> = methods.iter().flat_map(|list| list.split(',')).collect();
+    let unknown = asked.iter().find(|name| METHODS.iter().all(|method| method.key != **name));
+    assert_eq!(unknown, None, "LINKLIGHT_SOAK_METHODS: no method has this name");
+    assert!(frames > 1, "LINKLIGHT_SOAK_FRAMES={frames}: memory is compared between halves, so two at least");
+    let chosen = |key: &str| asked.is_empty() || asked.contains(&key);
     let folder = tempfile::tempdir().unwrap();
     for name in scenes.split(',') {
         let mut scene = format!("builtin:{name}");
