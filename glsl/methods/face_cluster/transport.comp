@@ -136,7 +136,7 @@ void main()
         if (sum > 1.0) at_nodes[r] /= sum;
         greatest_of_all = max(greatest_of_all, greatest[r]);
     }
-    float reflected = a.most_albedo * greatest_of_all;
+    float reflected = a.most_albedo * greatest_of_all;  // W, at most
     // What lights a receiver from many sides cancels in one vector, and a shooter is not as bright on all its sides: where
     // that is too much light, faces must be met apart, small as they are.
     bool is_bright = greatest_of_all > params.bent_light * a.area, splits_a = is_met_apart(a, is_bright, reflected, params.threshold) && can_split(a);

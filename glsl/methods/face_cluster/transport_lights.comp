@@ -74,7 +74,7 @@ void main()
         at_nodes[r] = outerProduct(kept_vector(a, direction), arrives);
     }
     // Nothing is kept from behind the mean normal: what many faces look at must find them apart, small as they are.
-    float reflected = a.most_albedo * greatest_of_all;
+    float reflected = a.most_albedo * greatest_of_all;  // W, at most
     if (is_met_apart(a, greatest_of_all > params.bent_light * a.area, reflected, params.threshold) && can_split(a)) {
         decisions[i] = SPLIT_RECEIVER;
         return;
