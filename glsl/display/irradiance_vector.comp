@@ -74,8 +74,8 @@ void main()
     if (!is_seen(pixel, params.eye, seen) || (!seen.surface.reflects && params.shows_colors == 0)) return;
 
     uvec2 sides = triangle_leaves[seen.triangle];
-    uint leaf = seen.is_back && sides.y != NO_FACE_ELEMENT ? sides.y : sides.x;
-    if (leaf == NO_FACE_ELEMENT) return;
+    uint leaf = seen.is_back && sides.y != NO_LEAF ? sides.y : sides.x;
+    if (leaf == NO_LEAF) return;
 
     Surface s = seen.surface;
     s.alpha = max(s.alpha, params.least_alpha);

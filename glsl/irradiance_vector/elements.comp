@@ -59,7 +59,7 @@ void main()
         uint triangle = incident_triangles[k];
         uvec2 sides = triangle_leaves[triangle];
         uint leaf = side < 0.0 ? sides.y : sides.x;
-        if (leaf == NO_FACE_ELEMENT) continue;
+        if (leaf == NO_LEAF) continue;
         uvec3 v = triangles[triangle];
         float area = length(cross(positions[v.y] - positions[v.x], positions[v.z] - positions[v.x]));
         mat3 d, i;

@@ -9,7 +9,7 @@
 //     uvec2 leaf_row(uint leaf)               first and end of the leaves beside it
 //     uint leaf_neighbour(uint index)
 //     void leaf_vectors(uint leaf, vec2 uv, out mat3 direct, out mat3 indirect)      W/m2, a column a channel
-#include "lib/face_element.glsl"
+#include "lib/leaf_element.glsl"
 
 LeafElement leaf_element(uint leaf);
 uvec2 leaf_row(uint leaf);

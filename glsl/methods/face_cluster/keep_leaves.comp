@@ -2,6 +2,7 @@
 #include "lib/prelude.glsl"
 #include "lib/cluster_basis.glsl"
 #include "lib/face_element.glsl"
+#include "lib/leaf_element.glsl"
 
 // One thread per element: of a leaf, its place and light go to the table of leaves, which is all that is kept of a
 // solution.                                                                                    [Gobbetti2003 4]
