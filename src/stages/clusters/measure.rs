@@ -80,8 +80,9 @@ fn measure_subtree(
     out[0] = cluster(own, &outline, fallback, first_face);
     let turned = out[0].area - super::normal_projected_area(&out[0]);
     let [front, back] = kept.map(|power| self_level(power, turned));
-    let least = u32::from(!forest.convex[first]);
-    out[0].face_count |= (front.max(least) * least) << INDEX_BITS;
+    // No front of a convex cluster sees another, whatever rounding says; of others, some does.
+    let front = if forest.convex[first] { 0 } else { front.max(1) };
+    out[0].face_count |= front << INDEX_BITS;
     out[0].first_face |= back << INDEX_BITS;
     let normal = super::axes(&out[0]).z_axis;
     (outline, normal, kept)
